@@ -57,8 +57,8 @@ class Keeping:
         keys = self._read()
         if keys == self._keys:
             return ""
-        self._state.load(keys)
-        self.sealing.install(keys)
+        loaded = self._state.load(keys)
+        self.sealing.install(usable(keys, loaded), loaded)
         self._keys = keys
         log.info("keys: %s", ", ".join(str(key.kid) for key in keys))
         return "keys"
@@ -84,7 +84,7 @@ class Keeping:
         if not problem:
             self.sealing.memory.written(wanted)
             return
-        if not self.sealing.memory.has_failed:
+        if not self.sealing.memory.failed:
             log.error("%s cannot be written (%s)", self._state.directory, problem)
         self.sealing.memory.not_written(problem)
 
@@ -105,13 +105,25 @@ def open_keeping(setup: Setup) -> Keeping | None:
                 "skipped; if that machine still runs, give this robot an id of its own"
             )
         sealing = Sealing(
-            setup.node_id, setup.config.link.pdu_size, security, keys, remembered, os.urandom,
+            setup.node_id, setup.config.link.pdu_size, security, usable(keys, remembered),
+            remembered, os.urandom,
             hears_self=setup.config.hears_self,
         )  # fmt: skip
         return Keeping(sealing, state, keys, lambda: load_keys(path))
     except UserError:
         state.close()
         raise
+
+
+def usable(keys: Sequence[Key], loaded: Remembered) -> list[Key]:
+    """The keys that were not replaced by a next one. Raises UserError if there is none."""
+    found = [key for key in keys if key.fingerprint not in loaded.retired]
+    if not found:
+        raise UserError(
+            "the keys of this robot were replaced by a next one, and do not open any more; "
+            "allowed: that one: sdrlinkctl key install"
+        )
+    return found
 
 
 def key_state(setup: Setup) -> KeyState:

@@ -47,8 +47,8 @@ class Reloading:
         Raises UserError and then changes nothing.
         """
         changed = self._read()
-        keys = self._keeping.reload() if self._keeping is not None else ""
         told = self._reload(changed)
+        keys = self._keeping.reload() if self._keeping is not None else ""
         return f"{keys}, {told}" if keys else told
 
     def _reload(self, changed: Setup) -> str:

@@ -100,7 +100,7 @@ def init(
         team = Team(preset, count, frequency, device, found, air, sockets, hub, is_sealed)
         files = {name: text.encode() for name, text in team_files(team, ids).items()}
         if is_sealed:
-            files[KEYS] = key_file_text([new_key(0)]).encode()
+            files[KEYS] = key_file_text(new_key(0)).encode()
     _write(files, out, force)
     console = Console(soft_wrap=True, highlight=False, markup=False)
     console.print(f"wrote {', '.join(str(out / name) for name in files)}")

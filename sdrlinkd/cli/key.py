@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from msgspec import structs
 from rich.console import Console
 
 from sdrlinkd.cli.app import RuntimeDir, app, connect
@@ -15,12 +16,11 @@ from sdrlinkd.errors import UserError
 
 if TYPE_CHECKING:
     from sdrlinkd.config import Setup
-    from sdrlinkd.keyring import KeyState, StoredKey
+    from sdrlinkd.keyring import KeyFile, KeyState, StoredKey
     from sdrlinkd.reports import SecurityReport, Snapshot
 
 DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
 KEY_FILE, NEXT_FILE = Path("team.key"), Path("next.key")
-N_KIDS = 4
 STDIN = Path("-")
 
 key_app = typer.Typer(help="Keys of a team, which seal its PDUs.", no_args_is_help=True)
@@ -36,11 +36,9 @@ def generate(
     file: Annotated[Path, typer.Argument(help="File to write.", metavar="FILE")] = KEY_FILE,
 ) -> None:
     """Make the first key of a team."""
-    from sdrlinkd.keyring import create_key_file, new_key
+    from sdrlinkd.keyring import new_key
 
-    key = new_key(0)
-    create_key_file(file, [key])
-    _say(f"wrote {file}, which only you can read", _told(key), *_next(file))
+    _create(file, new_key(0))
 
 
 @key_app.command()
@@ -49,18 +47,17 @@ def rotate(
     config: ConfigFile = DEFAULT_CONFIG,
 ) -> None:
     """Make the next key of a team, from which a lost robot is left out."""
-    from sdrlinkd.keyring import create_key_file, new_key, read_key_file
+    from sdrlinkd.keyring import new_key
+    from sdrlinkd.wire import N_KIDS
 
-    newest = read_key_file(Path(_setup(config).config.security.keys))[-1]
-    key = new_key((newest.kid + 1) % N_KIDS)
-    create_key_file(file, [key])
+    held = _held(Path(_setup(config).config.security.keys))
+    _create(file, new_key((held.key[-1].kid + 1) % N_KIDS))
     _say(
-        f"wrote {file}, which only you can read",
-        _told(key),
-        *_next(file),
-        "each robot changes to it once all robots that it hears have it, or after 10 minutes; "
-        "what seals with the old key is out then",
+        "each robot changes to it once all robots that it hears have it, or after 10 minutes; the "
+        "old key opens for 10 more minutes at most"
     )
+    if held.pair:
+        _say("the keys of pairs are not renewed: add new ones to the file, as [[pair]]")
 
 
 @key_app.command()
@@ -71,24 +68,31 @@ def install(
     ] = None,
     config: ConfigFile = DEFAULT_CONFIG,
     replace: Annotated[
-        bool, typer.Option("--replace", help="Use the new key in place of all others.")
+        bool, typer.Option("--replace", help="Use the new key in place of all others, at once.")
     ] = False,
+    copy: Annotated[
+        bool,
+        typer.Option(
+            "--copy/--no-copy",
+            help="Whether to write it to the robot's key file; not if it is a systemd credential.",
+        ),
+    ] = True,
 ) -> None:
     """Install a key on this robot: beside the one in use, to which the robots then change."""
-    from sdrlinkd.keyring import write_key_file
+    from sdrlinkd.keyring import check_number, write_key_file
 
     setup = _setup(config)
-    path = Path(setup.config.security.keys)
-    state = _state(setup)
-    state.check()
+    path, state = Path(setup.config.security.keys), _state(setup)
     owner = _owner(state.directory)
+    state.check()
     given = _given(path if file is None else file)
-    keys = _merged(_installed(path), given, state, path, replace=replace)
-    for key in keys:
-        state.install(key.key, owner)
-    if file is not None:
-        write_key_file(path, keys, owner)
-    _say(*(f"installed: {_told(key)}" for key in given))
+    installed = _held(path) if copy and path.exists() else None
+    keys = given if replace or installed is None else _merged(installed, given, state, path)
+    check_number(keys, str(path))
+    begun = [_begun(key, state, setup.node_id, owner) for key in keys.key]
+    if copy:
+        write_key_file(path, structs.replace(keys, key=begun), owner)
+    _say(*(f"installed: {_told(key)}" for key in given.key))
     if setup.config.security.mode == "off":
         _say(f'nothing is sealed yet: set mode = "seal" in [security] of {config}, at all robots')
         return
@@ -103,17 +107,16 @@ def show(
     config: ConfigFile = DEFAULT_CONFIG,
 ) -> None:
     """Show the keys as words, to compare them with those of another robot."""
-    from sdrlinkd.keyring import read_key_file
-
     if file is not None:
-        _say(*map(_told, read_key_file(file)))
+        _say(*map(_told, _held(file).key))
         return
     setup = _setup(config)
-    keys = read_key_file(Path(setup.config.security.keys))
-    state = _state(setup)
-    in_use = state.load([key.key for key in keys]).in_use
+    keys = _held(Path(setup.config.security.keys)).key
+    found = _state(setup).load([key.key for key in keys])
     for key in keys:
-        _say(_told(key) + (" (in use)" if key.fingerprint == in_use else ""))
+        more = " (in use)" if key.fingerprint == found.in_use else ""
+        more = " (replaced, does not open any more)" if key.fingerprint in found.retired else more
+        _say(_told(key) + more)
 
 
 @key_app.command()
@@ -166,48 +169,85 @@ def _state(setup: "Setup") -> "KeyState":
     return KeyState(state_dir(setup.config.security.state_dir, source), setup.node_id)
 
 
-def _given(file: Path) -> "list[StoredKey]":
-    from sdrlinkd.keyring import parse_key_file, read_key_file
+def _create(file: Path, keys: "KeyFile") -> None:
+    from sdrlinkd.keyring import create_key_file
+
+    create_key_file(file, keys)
+    _say(
+        f"wrote {file}, which only you can read",
+        *map(_told, keys.key),
+        "copy it to each robot by a way that you trust, and install it there:",
+        f"  sdrlinkctl key install {file}",
+        "compare the words, then delete the copies",
+    )
+
+
+def _given(file: Path) -> "KeyFile":
+    from sdrlinkd.keyring import parse_key_file
 
     if file == STDIN:
         return parse_key_file(sys.stdin.buffer.read(), "stdin")
-    return read_key_file(file)
+    return _held(file)
 
 
-def _installed(path: Path) -> "list[StoredKey]":
+def _held(path: Path) -> "KeyFile":
     from sdrlinkd.keyring import read_key_file
 
-    return read_key_file(path) if path.exists() else []
+    return read_key_file(path)
 
 
-def _merged(
-    installed: "list[StoredKey]", given: "list[StoredKey]", state: "KeyState", path: Path, *,
-    replace: bool,
-) -> "list[StoredKey]":  # fmt: skip
+def _merged(installed: "KeyFile", given: "KeyFile", state: "KeyState", path: Path) -> "KeyFile":
     """The keys to hold: the one in use, and the next one. Raises UserError."""
-    if replace:
-        return given
-    fresh = [
-        key for key in given if key.fingerprint not in {each.fingerprint for each in installed}
-    ]
+    known = {each.fingerprint for each in installed.key}
+    fresh = [key for key in given.key if key.fingerprint not in known]
     for key in fresh:
-        if any(each.kid == key.kid for each in installed):
+        if any(each.kid == key.kid for each in installed.key):
             raise UserError(
                 f"{path}: another key with kid {key.kid} is installed; allowed: the next key, made "
                 "with sdrlinkctl key rotate, or --replace"
             )
-    if fresh and len(installed) > 1:
-        in_use = state.load([each.key for each in installed]).in_use
-        installed = [each for each in installed if each.fingerprint == in_use] or installed[-1:]
-    return [*installed, *fresh]
+    kept = installed.key
+    if fresh and len(kept) > 1:
+        in_use = state.load([each.key for each in kept]).in_use
+        kept = [each for each in kept if each.fingerprint == in_use] or kept[-1:]
+    keys = [*kept, *fresh]
+    pairs = {(each.kid, *sorted(each.robots)): each for each in (*installed.pair, *given.pair)}
+    kids = {key.kid for key in keys}
+    return structs.replace(
+        installed, key=keys, pair=[each for each in pairs.values() if each.kid in kids]
+    )
+
+
+def _begun(
+    key: "StoredKey", state: "KeyState", robot: int, owner: tuple[int, int] | None
+) -> "StoredKey":
+    """The key, whose numbers begin on this robot if they have not begun. Raises UserError."""
+    if state.install(key.key, owner) and robot in key.robots:
+        state.forget(key.key)
+        raise UserError(
+            f"{state.directory}: the numbers of key {key.kid} were here and are lost; a number "
+            "must never be used twice, so make the next key: sdrlinkctl key rotate"
+        )
+    return structs.replace(key, robots=sorted({*key.robots, robot}))
 
 
 def _owner(directory: Path) -> tuple[int, int] | None:
-    """Who shall own what root writes: the owner of the state directory."""
+    """Who shall own what root writes: the owner of the state directory. Raises UserError."""
     if os.geteuid() != 0:
         return None
-    about = directory.stat()
-    return about.st_uid, about.st_gid
+    if directory.is_relative_to("/var/lib") and not directory.exists():
+        raise UserError(
+            f"{directory}: not there yet, so it is not known which user the daemon has; start the "
+            f"service once, or: install -d -m 750 -o sdrlink -g sdrlink {directory}"
+        )
+    return (about.st_uid, about.st_gid) if (about := _about(directory)) is not None else None
+
+
+def _about(directory: Path) -> os.stat_result | None:
+    try:
+        return directory.stat()
+    except OSError:
+        return None
 
 
 def _reloaded(setup: "Setup") -> str:
@@ -217,7 +257,10 @@ def _reloaded(setup: "Setup") -> str:
         with connect(Path(given) if given else None) as control:
             if control.ask("hello")["node"] != setup.node_id:
                 return "the daemon that runs here is another robot's: reload this robot's daemon"
-            return f"the daemon has re-read: {control.ask('reload')['reloaded']}"
+            told = control.ask("reload")["reloaded"]
+            if "keys" not in told and not control.ask("status")["link"]["security"]["fingerprint"]:
+                return "the daemon that runs does not seal: restart it"
+            return f"the daemon has re-read: {told}"
     except NoDaemonError:
         return "no daemon runs; it takes the key when it starts"
 
@@ -227,14 +270,6 @@ def _told(key: "StoredKey") -> str:
 
     made = f", made {key.created}" if key.created else ""
     return f"key {key.kid}{made}: {words_of(key.fingerprint)}"
-
-
-def _next(file: Path) -> list[str]:
-    return [
-        "copy it to each robot by a way that you trust, and install it there:",
-        f"  sdrlinkctl key install {file}",
-        "compare the words, then delete the copies",
-    ]
 
 
 def _say(*lines: str) -> None:

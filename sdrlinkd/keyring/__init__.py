@@ -6,7 +6,9 @@ nothing about PDUs: `sealing` does.
 
 from sdrlinkd.keyring.files import (
     CREDENTIAL,
+    KeyFile,
     StoredKey,
+    check_number,
     create_key_file,
     key_file_text,
     load_keys,
@@ -20,8 +22,10 @@ from sdrlinkd.keyring.words import words_of
 
 __all__ = [
     "CREDENTIAL",
+    "KeyFile",
     "KeyState",
     "StoredKey",
+    "check_number",
     "create_key_file",
     "key_file_text",
     "load_keys",

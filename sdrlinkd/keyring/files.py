@@ -3,7 +3,6 @@
 import os
 import stat
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -35,6 +34,8 @@ class StoredKey(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """The key itself: 32 octets in base64."""
     created: str = ""
     """Day on which it was made."""
+    robots: list[RobotId] = []
+    """Robots whose numbers were begun with this file."""
 
     @property
     def key(self) -> Key:
@@ -55,7 +56,9 @@ class StoredPair(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     secret: bytes
 
 
-class _File(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class KeyFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The keys and the pair keys in a file, the next key last."""
+
     key: list[StoredKey] = []
     pair: list[StoredPair] = []
 
@@ -67,64 +70,68 @@ def load_keys(path: Path) -> list[Key]:
     """
     folder = os.environ.get("CREDENTIALS_DIRECTORY", "")
     credential = Path(folder, CREDENTIAL)
-    stored, pairs = _read(credential if folder and credential.exists() else path)
-    if len(stored) > MOST_KEYS:
-        raise UserError(
-            f"{path}: {len(stored)} keys; allowed: the one in use and the next one: see "
-            "sdrlinkctl key show"
-        )
+    read = read_key_file(credential if folder and credential.exists() else path)
+    check_number(read, str(path))
     return [
         Key(
             each.kid,
             each.secret,
-            {frozenset(pair.robots): pair.secret for pair in pairs if pair.kid == each.kid},
+            {frozenset(pair.robots): pair.secret for pair in read.pair if pair.kid == each.kid},
         )
-        for each in stored
+        for each in read.key
     ]
 
 
-def read_key_file(path: Path) -> list[StoredKey]:
-    """The team's keys in a file, the next one last. Raises UserError."""
-    return _read(path)[0]
+def check_number(keys: KeyFile, source: str) -> None:
+    """Check that a robot can hold these keys. Raises UserError."""
+    if len(keys.key) > MOST_KEYS:
+        raise UserError(
+            f"{source}: {len(keys.key)} keys; allowed: the one in use and the next one: see "
+            "sdrlinkctl key show"
+        )
 
 
-def parse_key_file(text: bytes, source: str) -> list[StoredKey]:
-    """The team's keys in a file's content. Raises UserError, which cites `source`."""
-    return _parsed(text, source).key
+def parse_key_file(text: bytes, source: str) -> KeyFile:
+    """The keys in a file's content. Raises UserError, which cites `source`."""
+    if len(text) > MOST_BYTES:
+        raise UserError(f"{source}: more than {MOST_BYTES} bytes; allowed: a file with keys")
+    try:
+        read = msgspec.toml.decode(text, type=KeyFile)
+    except (msgspec.MsgspecError, ValueError) as error:
+        raise UserError(
+            f"{source}: {error}; allowed: what sdrlinkctl key generate writes"
+        ) from None
+    _check(source, read)
+    return read
 
 
-def key_file_text(keys: Sequence[StoredKey]) -> str:
-    """A key file with these keys."""
-    return HEAD + tomli_w.dumps(msgspec.to_builtins({"key": list(keys)}))
+def key_file_text(keys: KeyFile) -> str:
+    """A file with these keys."""
+    told = msgspec.to_builtins(keys)
+    return HEAD + tomli_w.dumps({name: each for name, each in told.items() if each})
 
 
-def create_key_file(path: Path, keys: Sequence[StoredKey]) -> None:
+def create_key_file(path: Path, keys: KeyFile) -> None:
     """Write a new key file for its owner alone. Raises UserError if there is one already."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     try:
         with os.fdopen(os.open(path, flags, 0o600), "w") as file:
             file.write(key_file_text(keys))
     except FileExistsError:
-        raise UserError(
-            f"{path}: there already; allowed: another file, as keys are precious"
-        ) from None
+        raise UserError(f"{path}: there already; allowed: the name of a new file") from None
     except OSError as error:
         raise UserError(f"{path} cannot be written ({error.strerror})") from None
 
 
-def write_key_file(path: Path, keys: Sequence[StoredKey], owner: tuple[int, int] | None) -> None:
-    """Write the keys to a file for its owner alone; pair keys in it stay. Raises UserError.
+def write_key_file(path: Path, keys: KeyFile, owner: tuple[int, int] | None) -> None:
+    """Write keys to a file for its owner alone. Raises UserError.
 
     `owner` is the (user, group) that it is given to, None: the one who writes.
     """
-    pairs = _read(path)[1] if path.exists() else []
-    kept = [each for each in pairs if each.kid in {key.kid for key in keys}]
-    told = {"key": list(keys), **({"pair": kept} if kept else {})}
-    text = HEAD + tomli_w.dumps(msgspec.to_builtins(told))
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=".keys-")
         with os.fdopen(handle, "w") as file:
-            file.write(text)
+            file.write(key_file_text(keys))
             if owner is not None:
                 os.fchown(file.fileno(), *owner)
             file.flush()
@@ -134,7 +141,8 @@ def write_key_file(path: Path, keys: Sequence[StoredKey], owner: tuple[int, int]
         raise UserError(f"{path} cannot be written ({error.strerror})") from None
 
 
-def _read(path: Path) -> tuple[list[StoredKey], list[StoredPair]]:
+def read_key_file(path: Path) -> KeyFile:
+    """The keys in a file. Raises UserError."""
     try:
         with path.open("rb") as file:
             about = os.fstat(file.fileno())
@@ -150,24 +158,10 @@ def _read(path: Path) -> tuple[list[StoredKey], list[StoredPair]]:
         raise UserError(
             f"{path} cannot be read ({error.strerror}); sdrlinkctl key install puts a key there"
         ) from None
-    read = _parsed(text, str(path))
-    return read.key, read.pair
+    return parse_key_file(text, str(path))
 
 
-def _parsed(text: bytes, source: str) -> _File:
-    if len(text) > MOST_BYTES:
-        raise UserError(f"{source}: more than {MOST_BYTES} bytes; allowed: a file with keys")
-    try:
-        read = msgspec.toml.decode(text, type=_File)
-    except (msgspec.MsgspecError, ValueError) as error:
-        raise UserError(
-            f"{source}: {error}; allowed: what sdrlinkctl key generate writes"
-        ) from None
-    _check(source, read)
-    return read
-
-
-def _check(path: str, read: _File) -> None:
+def _check(path: str, read: KeyFile) -> None:
     if not read.key:
         raise UserError(f"{path}: no key in it; allowed: what sdrlinkctl key generate writes")
     kids = [each.kid for each in read.key]

@@ -32,6 +32,7 @@ class _OfKey(msgspec.Struct, frozen=True, kw_only=True):
     machine: str
     floor: int
     in_use: bool = False
+    retired: bool = False
     newest: dict[int, int] = {}
 
 
@@ -71,14 +72,15 @@ class KeyState:
 
     def load(self, keys: Sequence[Key]) -> Remembered:
         """What is on disk about `keys`, all of which must be installed here. Raises UserError."""
-        floors, newest, in_use = {}, {}, b""
+        floors, newest, in_use, retired = {}, {}, b"", set()
         machine = machine_hash()
         for key in keys:
             state = self._read(key.fingerprint)
             if state is None:
                 raise UserError(
-                    f"{self.directory}: key {key.kid} was never installed on this robot, or its "
-                    "numbers are lost; allowed: a key that sdrlinkctl key install has put here"
+                    f"{self.directory}: no numbers of key {key.kid}. If it was never installed on "
+                    "this robot: sdrlinkctl key install. If they are lost: sdrlinkctl key rotate, "
+                    "as a number must never be used twice"
                 )
             floor = state.floor
             if state.machine != machine:
@@ -88,7 +90,9 @@ class KeyState:
             newest[key.fingerprint] = state.newest
             if state.in_use:
                 in_use = key.fingerprint
-        return Remembered(floors, newest, in_use)
+            if state.retired:
+                retired.add(key.fingerprint)
+        return Remembered(floors, newest, in_use, frozenset(retired), self._known())
 
     def save(self, remembered: Remembered) -> None:
         """Write what must be remembered; it is on disk on return. Raises OSError."""
@@ -99,6 +103,7 @@ class KeyState:
                 machine=machine,
                 floor=floor,
                 in_use=fingerprint == remembered.in_use,
+                retired=fingerprint in remembered.retired,
                 newest=dict(remembered.newest.get(fingerprint, {})),
             )
             if self._written.get(fingerprint) != state:
@@ -116,9 +121,9 @@ class KeyState:
             raise UserError(self._unusable(error)) from None
         return True
 
-    def is_installed(self, key: Key) -> bool:
-        """Whether a key has a state here. Raises UserError."""
-        return self._read(key.fingerprint) is not None
+    def forget(self, key: Key) -> None:
+        """Remove the state of a key that was just begun."""
+        self._path(key.fingerprint.hex()).unlink(missing_ok=True)
 
     def check(self) -> None:
         """Check that the directory can be written. Raises UserError."""
@@ -128,6 +133,14 @@ class KeyState:
                 pass
         except OSError as error:
             raise UserError(self._unusable(error)) from None
+
+    def _known(self) -> frozenset[int]:
+        """All robots of which a sealed PDU was opened, with whatever key."""
+        found: set[int] = set()
+        for path in self.directory.glob(f"robot-{self._robot_id}-key-*.json"):
+            with contextlib.suppress(OSError, msgspec.MsgspecError, ValueError):
+                found |= msgspec.json.decode(path.read_bytes(), type=_OfKey).newest.keys()
+        return frozenset(found)
 
     def _unusable(self, error: OSError) -> str:
         return (

@@ -17,6 +17,7 @@ class Ciphers:
 
     def __init__(self, key: Key, mode: str) -> None:
         self.key = key
+        self._pairs = key.pairs
         self._ticks, self._number = -1, b""
         self._mode = _MODES[mode]
         self._is_auth = mode == "auth"
@@ -28,14 +29,14 @@ class Ciphers:
             # Many PDUs have one T.
             self._ticks, self._number = ticks, seal_number(self.key.kid, ticks)
         head, nonce, associated, text = seal_parts(inner, self._number)
-        cipher = self._by_ends.get((inner[1], inner[2])) or self._cipher(inner[1], inner[2])
+        cipher = self._cipher(inner[1], inner[2])
         if self._is_auth:
             return build_sealed(head, text + cipher.encrypt(nonce, b"", associated + text))
         return build_sealed(head, cipher.encrypt(nonce, text, associated))
 
     def open(self, pdu: Sealed) -> bytes | None:
         """The plaintext of a PDU; None if it does not open."""
-        cipher = self._by_ends.get((pdu.src, pdu.dst)) or self._cipher(pdu.src, pdu.dst)
+        cipher = self._cipher(pdu.src, pdu.dst)
         nonce, associated, secret = pdu.parts()
         try:
             if self._is_auth:
@@ -47,13 +48,14 @@ class Ciphers:
             return None
 
     def _cipher(self, src: int, dst: int) -> AESCCM:
-        own = (src, dst if self._pair(src, dst) else BROADCAST)
-        if own not in self._by_ends:
-            self._by_ends[own] = self._derived(*own)
-        return self._by_ends.setdefault((src, dst), self._by_ends[own])
+        ends = (src, dst if self._pairs and self._pair(src, dst) else BROADCAST)
+        cipher = self._by_ends.get(ends)
+        if cipher is None:
+            cipher = self._by_ends[ends] = self._derived(*ends)
+        return cipher
 
     def _pair(self, src: int, dst: int) -> bytes | None:
-        return self.key.pairs.get(frozenset((src, dst))) if self.key.pairs else None
+        return self._pairs.get(frozenset((src, dst)))
 
     def _derived(self, src: int, dst: int) -> AESCCM:
         pair = self._pair(src, dst)

@@ -2,7 +2,7 @@
 
 import math
 
-from sdrlinkd.sealing.peers import Peers
+from sdrlinkd.sealing.peers import PROOF_S, Peers
 from sdrlinkd.wire import (
     AHEAD_UNIT_S,
     CONTACT_OVERHEAD,
@@ -16,6 +16,10 @@ from sdrlinkd.wire import (
 PATIENCE_S = 0.2
 """Time in s for which a CONTACT waits for spare room, and the first period."""
 LONGEST_PERIOD_S = 5.0
+LATELY_S = 60.0
+"""Time in s without a PDU of a robot after which it is not named any more."""
+SOON_S = 1.0
+"""Time in s within which our CONTACT follows those of a robot that says its own often."""
 _FARTHEST = (1 << 31) - 1
 _MOST = (0xFF - CONTACT_OVERHEAD + TLV_HEADER_SIZE) // MET_SIZE
 
@@ -29,6 +33,7 @@ class Contacts:
         """When the next CONTACT is due, in s."""
         self._period_s = PATIENCE_S
         self._turn = 0
+        self._hurried_at = -math.inf
 
     @property
     def prefix(self) -> bytes:
@@ -40,20 +45,33 @@ class Contacts:
         self._period_s = PATIENCE_S
         self.due_at = min(self.due_at, now)
 
-    def record(self, now: float, room: int, peers: Peers) -> Contact:
-        """The CONTACT that is due at `now`, of at most `room` octets."""
-        self.due_at = now + PATIENCE_S + self._period_s
-        self._period_s = min(2 * self._period_s, LONGEST_PERIOD_S - PATIENCE_S)
-        met = [
+    def hurry(self, now: float) -> None:
+        """Say it soon, as a robot says its own often, and so may lack our answer."""
+        if self.due_at > now + SOON_S and now - self._hurried_at > LONGEST_PERIOD_S:
+            self._hurried_at = now
+            self.met_somebody(now)
+
+    def record(self, now: float, room: int, peers: Peers, offset_s: float) -> Contact:
+        """The CONTACT that is due at `now`, of at most `room` octets.
+
+        `offset_s` is our key time minus the clock of the leads.
+        """
+        known = [
             Met(src, peer.number[:CONTACT_PREFIX_SIZE], ticks)
             for src, peer in peers
             if peer.number is not None
-            and math.isfinite(peer.least.value)
-            and abs(ticks := math.ceil(peer.least.value / AHEAD_UNIT_S)) <= _FARTHEST
+            # What is older would be wrong by the drift of the clocks.
+            and now - peer.least.added_at < LATELY_S
+            and abs(ticks := math.ceil((peer.least.value + offset_s) / AHEAD_UNIT_S)) <= _FARTHEST
         ]
         most = max(0, min((room - CONTACT_OVERHEAD) // MET_SIZE, _MOST))
-        if len(met) > most:
-            first = self._turn % len(met)
-            met = (met[first:] + met[:first])[:most]
+        met = known
+        if len(known) > most:
+            first = self._turn % len(known)
+            met = (known[first:] + known[:first])[:most]
             self._turn += most
+        # All robots are named several times while a proof lasts.
+        longest_s = PROOF_S / (3 * -(-len(known) // max(most, 1)) or 1)
+        self.due_at = now + PATIENCE_S + self._period_s
+        self._period_s = min(2 * self._period_s, LONGEST_PERIOD_S - PATIENCE_S, longest_s)
         return Contact(self.number, tuple(met))

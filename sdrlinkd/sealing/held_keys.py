@@ -1,6 +1,6 @@
 """The keys held, and the ciphers that follow from them."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from sdrlinkd.sealing.keys import Key
@@ -18,7 +18,6 @@ class HeldKeys:
         self.mode = mode
         self.rotation = Rotation(keys, in_use)
         self.by_kid: dict[int, Ciphers] = {}
-        self._ready: Collection[bytes] = ()
         self._take()
 
     @property
@@ -31,14 +30,15 @@ class HeldKeys:
         self.rotation.install(keys)
         self._take()
 
-    def note_ready(self, fingerprints: Collection[bytes]) -> None:
-        """Note the keys whose floors are on disk."""
-        self._ready = fingerprints
+    def look(self, now: float, heard_at: Mapping[int, float]) -> bool:
+        """Change to the next key if it is time; returns whether another key seals now.
 
-    def look(self, now: float, heard_at: Mapping[int, float]) -> None:
-        """Change to the next key if it is time; `heard_at`: when each other robot was heard."""
-        if self.rotation.look(now, heard_at, self._ready):
+        `heard_at`: when each other robot was heard.
+        """
+        before = self.own.key
+        if self.rotation.look(now, heard_at):
             self._take()
+        return self.own.key != before
 
     def told(self, key: Key) -> KeyTold:
         """The KEY record of a key."""

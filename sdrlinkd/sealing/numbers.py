@@ -1,6 +1,7 @@
 """The numbers of our sealed PDUs: each (T, seq) once, whatever happens to clocks and power."""
 
-from math import floor, inf
+from math import floor as whole
+from math import inf
 
 from sdrlinkd.wire import N_TICKS, TICKS_PER_S
 
@@ -23,7 +24,7 @@ class Numbers:
     """
 
     def __init__(self, floor: int) -> None:
-        begin = floor + round(LEAP_S * TICKS_PER_S) if floor else 0
+        begin = min(floor + round(LEAP_S * TICKS_PER_S), N_TICKS) if floor else 0
         self._begin = begin
         self._zero: float | None = None
         self.floor = begin
@@ -46,17 +47,29 @@ class Numbers:
             self._zero = at
         return self._begin / TICKS_PER_S + (at - self._zero)
 
+    def offset(self, at: float) -> float:
+        """The key time minus the link's clock at time `at`, in s; it changes with the key alone."""
+        return self.clock(at) - at
+
     def begin_anew(self) -> None:
         """Go on from the newest T, as another clock starts."""
         if self._zero is not None:
             self._begin, self._zero, self._then = self.newest + 1, None, -inf
 
-    def leap_beyond(self, floor: int) -> None:
-        """Use no T below `floor`, as another key was used up to there."""
-        if floor > self.newest:
-            self._begin, self._zero = floor + round(LEAP_S * TICKS_PER_S), None
-            self._then = -inf
-            self.newest = max(self.newest, self._begin)
+    def change_key(self, floor: int) -> None:
+        """Seal with another key from now on, of which `floor` is on disk; 0: it is new.
+
+        T goes on, so that others notice nothing, as long as that leaves the key half of its life.
+        No number is given out before `move_floor`.
+        """
+        if floor > self.newest or self.newest >= N_TICKS // 2:
+            leap = round(LEAP_S * TICKS_PER_S) if floor else 0
+            self._begin, self._zero = min(floor + leap, N_TICKS), None
+            self.first = self.newest = self._begin
+            self._used.clear()
+            self._last = [-1] * N_SEQS
+        self._then = -inf
+        self.floor = self._end = self.newest
 
     def is_out(self, at: float) -> bool:
         """Whether no number that is on disk is left at `at`."""
@@ -68,8 +81,9 @@ class Numbers:
 
     def wanted_floor(self, at: float) -> int | None:
         """The floor that should be written to disk now; None: the present one suffices."""
-        ticks = max(self._ticks(at), self.newest)
-        if self.floor - ticks > LEAST_RESERVE_S * TICKS_PER_S:
+        # Before the first burst, no time has begun.
+        ticks = self.newest if self._zero is None else max(self._ticks(at), self.newest)
+        if self.floor - ticks > LEAST_RESERVE_S * TICKS_PER_S or self.floor >= N_TICKS:
             return None
         return min(ticks + round(RESERVE_S * TICKS_PER_S), N_TICKS)
 
@@ -113,4 +127,4 @@ class Numbers:
 
     def _ticks(self, at: float) -> int:
         # Never ahead of the key time: that no PDU seems younger than it is depends on this.
-        return floor(self.clock(at) * TICKS_PER_S)
+        return whole(self.clock(at) * TICKS_PER_S)

@@ -1,9 +1,10 @@
 """Opens the PDUs of others: keys, numbers, proofs and delays (wire document, 11.4 and 11.5)."""
 
+import struct
 from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
-from sdrlinkd.sealing.contacts import Contacts
+from sdrlinkd.sealing.contacts import SOON_S, Contacts
 from sdrlinkd.sealing.held_keys import HeldKeys
 from sdrlinkd.sealing.numbers import Numbers
 from sdrlinkd.sealing.params import SecurityParams
@@ -39,7 +40,7 @@ _CONTACT_MARK, _KEY_MARK = bytes((RecordType.CONTACT,)), bytes((RecordType.KEY,)
 class Opened(NamedTuple):
     """A PDU that opened: its inner PDU, with the times inside as if it had not been delayed.
 
-    `lead_s` is our key time at its arrival minus the T in it. Until its source is proven, the PDU
+    `lead_s` is the time of its arrival minus the T in it. Until its source is proven, the PDU
     must wait.
     """
 
@@ -54,7 +55,7 @@ class Opened(NamedTuple):
 class Opener:
     """Opens sealed PDUs, and decides on those in the clear. Times are on the link's clock, in s.
 
-    `remembers` says whether a sealed PDU of a robot was opened in an earlier life.
+    `known_before` are the robots of which a sealed PDU was opened in an earlier life.
     """
 
     def __init__(
@@ -97,14 +98,16 @@ class Opener:
         window = peer.window(kid)
         reason = window.judge(ticks, seq)
         if reason:
+            if reason == "sec_replay":
+                self._strangers.old(src, at)
             raise PduError(reason, f"number {ticks}, {seq} of robot {src}")
         text = ciphers.open(pdu)
         if text is None:
             raise self._closed("sec_bad_tag", src, dst, kid, at)
         inner, is_own = pdu.inner(text), src == self._own_id
-        lead_s = self._numbers.clock(at) - ticks / TICKS_PER_S
+        lead_s = at - ticks / TICKS_PER_S
         held_s = held * HELD_UNIT_S
-        if peer.note(lead_s, at):
+        if peer.note(lead_s, at, kid, self._limit_s):
             # Our proof may have lapsed there, too.
             self._contacts.met_somebody(at)
         if self._strangers.by_src:
@@ -113,17 +116,20 @@ class Opener:
             self._keys.rotation.opened(src, kid, at)
         if is_own:
             self._has_double(ticks, seq)
+            if not self._hears_self:
+                raise PduError("rx_own", "our own source id")
         elif (_CONTACT_MARK in text or _KEY_MARK in text) and _has_records(inner):
             self._take_records(src, inner, lead_s, held_s, at)
         is_proven = peer.has_proof
-        if is_own and self._hears_self:
+        if is_own:
             is_proven = True
         elif peer.is_late(lead_s, held_s, self._limit_s, is_judged=is_proven or self._takes_all):
+            self._strangers.late(src, at)
             raise PduError("sec_late", f"held {held_s:g} s, robot {src}")
         window.take(ticks, seq)
         peer.heard_at = at
         if held:
-            inner = aged(inner, round(1e6 * held_s))
+            inner = _aged(inner, held_s)
         return _make(Opened, (inner, src, ticks, lead_s, held_s, is_proven))
 
     def is_late(self, src: int, lead_s: float, held_s: float) -> bool:
@@ -178,6 +184,9 @@ class Opener:
     def _take_contact(
         self, peer: Peer, contact: Contact, lead_s: float, held_s: float, at: float
     ) -> None:
+        if at - peer.contact_at < SOON_S:
+            self._contacts.hurry(at)
+        peer.contact_at = at
         if contact.number != peer.number:
             if peer.number is not None:
                 peer.restart()
@@ -186,9 +195,17 @@ class Opener:
             self._contacts.met_somebody(at)
         for node, number, ticks in contact.met:
             if node == self._own_id and number == self._contacts.prefix:
-                ahead_s = ticks * AHEAD_UNIT_S
+                ahead_s = ticks * AHEAD_UNIT_S + self._numbers.offset(at)
                 if abs(lead_s + ahead_s - held_s) <= self._limit_s:
                     peer.prove(Proof(ahead_s, at))
+
+
+def _aged(inner: bytes, held_s: float) -> bytes:
+    """An inner PDU with the times inside as if it had not been delayed. Raises PduError."""
+    try:
+        return aged(inner, round(1e6 * held_s))
+    except (IndexError, struct.error):
+        raise PduError("rx_entry", "entries that contradict themselves") from None
 
 
 def _has_records(inner: bytes) -> bool:

@@ -15,10 +15,10 @@ SILENT_S = 20.0
 
 If it restarts, its T leaps by more than this. So an attacker who delays all PDUs of its new life by
 that leap, to make them look like those of the old one, meets a source that is not proven."""
+CHANGED_S = 1.0
+"""Change of a lead in s, with a change of key, that shows a clock which has begun anew."""
 PROOF_S = 60.0
 """Time in s for which a proof lasts; the drift of two clocks in it is negligible."""
-RESTARTED_S = -0.13
-"""A delay in s below which the source's clock must have begun anew."""
 
 
 class Window:
@@ -53,9 +53,11 @@ class Least:
         self._now = self._before = inf
         self.value = inf
         """The least value; infinity if there is none."""
+        self.added_at = -inf
 
     def add(self, value: float, at: float) -> None:
         """Note a value at time `at`."""
+        self.added_at = at
         if at >= self._begin + BUCKET_S:
             is_next = at < self._begin + 2 * BUCKET_S
             self._before, self._now = (self._now if is_next else inf), inf
@@ -88,6 +90,16 @@ class Peers:
         known = self._by_src.get(src)
         return known is not None and any(each.newest >= 0 for each in known.windows.values())
 
+    def change_key(self, kid: int) -> None:
+        """Forget the numbers under a kid, which now is another key's."""
+        for peer in self._by_src.values():
+            peer.windows.pop(kid, None)
+
+    def restart(self) -> None:
+        """Forget all proofs and leads, as our own clock begins anew."""
+        for peer in self._by_src.values():
+            peer.restart()
+
     def newest(self, kid: int) -> dict[int, int]:
         """The newest T of each source under a key."""
         return {
@@ -107,7 +119,7 @@ class Proof(NamedTuple):
 class Peer:
     """One source of sealed PDUs.
 
-    `lead_s` below is our key time at a PDU's arrival minus the T in it, in s: how far our clock is
+    `lead_s` below is the time of a PDU's arrival minus the T in it, in s: how far our clock is
     ahead of the source's, plus the PDU's delay.
     """
 
@@ -120,6 +132,11 @@ class Peer:
         self.number: bytes | None = None
         """Its number in CONTACT."""
         self._proof: Proof | None = None
+        self.first_at = inf
+        """When its first PDU since it was proven last, or ever, came, in s."""
+        self._kid = -1
+        self.contact_at = -inf
+        """When its last CONTACT came, in s."""
         self.heard_at = -inf
         """When its last PDU that was in time came, in s."""
 
@@ -135,16 +152,27 @@ class Peer:
             window = self.windows[kid] = Window(self._oldest(kid))
         return window
 
-    def note(self, lead_s: float, at: float) -> bool:
-        """Note the lead of a PDU that opens at `at`; returns whether a proof has ended."""
+    def note(self, lead_s: float, at: float, kid: int, limit_s: float) -> bool:
+        """Note the lead of a PDU that opens at `at`; returns whether a proof has ended.
+
+        A delay of less than `-limit_s` shows that the source's clock has begun anew.
+        """
+        if kid != self._kid:
+            # With another key, the source's clock may have begun anew, and then comes much later.
+            is_other = abs(lead_s - self.least.value) > CHANGED_S
+            self._kid = kid
+            if is_other:
+                self.restart()
         proof, ended = self._proof, False
         if proof is not None:
-            if lead_s + proof.ahead_s < RESTARTED_S:
+            if lead_s + proof.ahead_s < -limit_s:
                 self.restart()
                 ended = True
             elif not self.is_proven(at):
                 self._proof, ended = None, True
         self.least.add(lead_s, at)
+        if ended or self.first_at == inf:
+            self.first_at = at
         return ended
 
     @property

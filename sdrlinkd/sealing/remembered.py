@@ -15,6 +15,10 @@ class Remembered(NamedTuple):
     newest: Mapping[bytes, Mapping[int, int]] = {}
     in_use: bytes = b""
     """Fingerprint of the key that sealed last."""
+    retired: frozenset[bytes] = frozenset()
+    """Fingerprints of the keys that do not open any more."""
+    known: frozenset[int] = frozenset()
+    """Robots of which a sealed PDU was opened at any time."""
 
 
 class Memory:
@@ -23,61 +27,54 @@ class Memory:
     def __init__(
         self, remembered: Remembered, keys: HeldKeys, numbers: Numbers, peers: Peers
     ) -> None:
-        self._remembered = remembered
+        self.on_disk = remembered
         self._keys = keys
         self._numbers = numbers
         self._peers = peers
-        self._failed = ""
-        self._is_out = False
-
-    @property
-    def problem(self) -> str:
-        """Why no number may be used any more, as a sentence; empty: all is well."""
-        return self._failed if self._is_out else ""
-
-    @property
-    def has_failed(self) -> bool:
-        """Whether the last attempt to write has failed."""
-        return bool(self._failed)
+        self.failed = ""
+        """Why the last attempt to write has failed, as a sentence; empty: it has not."""
 
     def wanted(self, now: float) -> Remembered | None:
         """What should be written at `now`; None: what is on disk suffices."""
-        self._is_out = self._numbers.is_out(now)
-        floor, on_disk = self._numbers.wanted_floor(now), self._remembered
-        is_known = on_disk.in_use == self._keys.own.key.fingerprint and all(
-            key.fingerprint in on_disk.floors for key in self._keys.all
-        )
-        if floor is None and is_known:
+        floor, own = self._numbers.wanted_floor(now), self._keys.own.key.fingerprint
+        retired = self.on_disk.retired | self._keys.rotation.retired
+        if floor is None and self.on_disk.in_use == own and self.on_disk.retired == retired:
             return None
         return self._present(self._numbers.floor if floor is None else floor)
 
     def written(self, remembered: Remembered) -> None:
         """Note what is on disk now."""
-        self._remembered = remembered
-        self._failed = ""
-        self._keys.note_ready(remembered.floors.keys())
-        self._numbers.move_floor(remembered.floors[self._keys.own.key.fingerprint])
+        self.on_disk, self.failed = remembered, ""
+        if remembered.in_use == self._keys.own.key.fingerprint:
+            self._numbers.move_floor(remembered.floors[remembered.in_use])
 
     def not_written(self, why: str) -> None:
         """Note that nothing could be written."""
-        self._failed = f"the numbers of sealed PDUs cannot be written to disk: {why}"
+        self.failed = f"the numbers of sealed PDUs cannot be written to disk: {why}"
+
+    def add(self, loaded: Remembered) -> None:
+        """Note what is on disk about keys that were installed while all runs."""
+        on_disk = self.on_disk
+        floors = dict(on_disk.floors)
+        for fingerprint, floor in loaded.floors.items():
+            floors[fingerprint] = max(floors.get(fingerprint, 0), floor)
+        newest = {**loaded.newest, **on_disk.newest}
+        self.on_disk = on_disk._replace(floors=floors, newest=newest)
 
     def at_stop(self) -> Remembered:
         """What should be written when the daemon stops: the floor as it is, and the newest T."""
         return self._present(self._numbers.floor)
 
     def _present(self, floor: int) -> Remembered:
-        newest = dict(self._remembered.newest)
+        on_disk, own = self.on_disk, self._keys.own.key.fingerprint
+        newest = dict(on_disk.newest)
         for key in self._keys.all:
             known = dict(newest.get(key.fingerprint, {}))
             for src, ticks in self._peers.newest(key.kid).items():
                 known[src] = max(known.get(src, 0), ticks)
             newest[key.fingerprint] = known
-        floors = {key.fingerprint: floor for key in self._keys.all}
-        in_use = self._keys.own.key.fingerprint
-        return Remembered({**self._remembered.floors, **floors}, newest, in_use)
-
-
-def floor_of(remembered: Remembered, keys: HeldKeys) -> int:
-    """The highest floor of the keys held: T counts on when the key changes."""
-    return max(remembered.floors.get(key.fingerprint, 0) for key in keys.all)
+        # A floor is never lowered.
+        floors = {**on_disk.floors, own: max(floor, on_disk.floors.get(own, 0))}
+        heard = frozenset(src for each in newest.values() for src in each)
+        retired = on_disk.retired | self._keys.rotation.retired
+        return Remembered(floors, newest, own, retired, on_disk.known | heard)

@@ -5,7 +5,7 @@ until all robots that it hears have the next one, or for a limited time: a robot
 stolen must not delay the others for ever.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 
 from sdrlinkd.sealing.keys import Key
@@ -23,6 +23,8 @@ class Rotation:
     """The keys that open, and the one that seals; `in_use` is the fingerprint of the last one."""
 
     def __init__(self, keys: Sequence[Key], in_use: bytes) -> None:
+        self.retired: set[bytes] = set()
+        """Fingerprints of the keys that do not open any more."""
         self.keys = list(keys)
         """The keys that open PDUs, the next one last."""
         self.own = next((key for key in keys if key.fingerprint == in_use), self.keys[0])
@@ -39,8 +41,8 @@ class Rotation:
     def install(self, keys: Sequence[Key]) -> None:
         """Take other keys; the one that seals stays if it is among them."""
         self.keys = list(keys)
-        if self.own not in self.keys:
-            self.own = self.keys[0]
+        own = self.own.fingerprint
+        self.own = next((key for key in keys if key.fingerprint == own), self.keys[0])
         self._have_next.clear()
         self._since = None
 
@@ -58,11 +60,10 @@ class Rotation:
         elif further is None and kid != self.own.kid:
             self._old_at = at
 
-    def look(self, now: float, heard_at: Mapping[int, float], ready: Collection[bytes]) -> bool:
+    def look(self, now: float, heard_at: Mapping[int, float]) -> bool:
         """Change keys if it is time; returns whether something changed.
 
-        `heard_at` says when each other robot was heard, by id. `ready` are the fingerprints of the
-        keys whose floors are on disk.
+        `heard_at` says when each other robot was heard, by id.
         """
         if len(self.keys) == 1:
             return False
@@ -72,10 +73,9 @@ class Rotation:
         if further is None:
             if waited_s < LONGEST_S and now - max(self._old_at, self._since) < QUIET_S:
                 return False
+            self.retired |= {key.fingerprint for key in self.keys if key != self.own}
             self.keys = [self.own]
             return True
-        if further.fingerprint not in ready:
-            return False
         present = {src for src, at in heard_at.items() if now - at < PRESENT_S}
         if waited_s < LONGEST_S and not (present and present <= self._have_next):
             return False

@@ -10,7 +10,7 @@ from sdrlinkd.sealing.numbers import Numbers
 from sdrlinkd.sealing.opener import Opener
 from sdrlinkd.sealing.params import SecurityParams
 from sdrlinkd.sealing.peers import Peers
-from sdrlinkd.sealing.remembered import Memory, Remembered, floor_of
+from sdrlinkd.sealing.remembered import Memory, Remembered
 from sdrlinkd.sealing.strangers import Strangers
 from sdrlinkd.wire import (
     CONTACT_NUMBER_SIZE,
@@ -21,6 +21,7 @@ from sdrlinkd.wire import (
     KeyTold,
     delayed,
     depends_on_start,
+    is_sealed,
     postponed,
     with_seq,
 )
@@ -28,6 +29,8 @@ from sdrlinkd.wire import (
 DAY_S = 86400.0
 USED_UP_DAYS = 30.0
 """Days before the end of a key from which a person is told."""
+RECENT_S, PROVES_S = 10.0, 5.0
+"""A robot heard in the last RECENT_S should be proven PROVES_S after it was heard first."""
 FORGOTTEN_S = 60.0
 """Time in s after which a robot is left out of the report."""
 
@@ -54,20 +57,18 @@ class Sealing:
         self.inner_size = pdu_size - SEAL_OVERHEAD
         self._own_id = own_id
         self._params = params
-        self._remembered = remembered
         self._keys = HeldKeys(keys, params.mode, remembered.in_use)
-        self._numbers = Numbers(floor_of(remembered, self._keys))
+        self._numbers = Numbers(remembered.floors.get(self._keys.own.key.fingerprint, 0))
         self._peers = Peers(self._oldest)
         self._contacts = Contacts(draw(CONTACT_NUMBER_SIZE))
         self._strangers = Strangers(self._keys)
-        known_before = frozenset(src for each in remembered.newest.values() for src in each)
         self.opener = Opener(
             own_id, pdu_size, params, self._keys, self._numbers, self._peers, self._contacts,
-            self._strangers, known_before, hears_self,
+            self._strangers, remembered.known, hears_self,
         )  # fmt: skip
         self.memory = Memory(remembered, self._keys, self._numbers, self._peers)
         self._waits = 0
-        self._is_used_up = False
+        self._is_used_up = self._is_out = False
 
     @property
     def halted(self) -> str:
@@ -80,12 +81,14 @@ class Sealing:
         if self._is_used_up:
             kid = self._keys.own.key.kid
             return f"key {kid} is used up: make the next one with sdrlinkctl key rotate"
-        return self.memory.problem
+        if self._is_out:
+            return self.memory.failed or "the disk does not take the numbers of sealed PDUs in time"
+        return ""
 
     def may_send(self, start: float, seq: int, n: int) -> bool:
         """Whether a burst at `start` can hold `n` PDUs of ours from `seq` on."""
-        if self._numbers.is_used_up(start):
-            self._is_used_up = True
+        self._is_used_up = self._numbers.is_used_up(start)
+        self._is_out = self._numbers.is_out(start)
         if self.halted:
             return False
         fits = self._numbers.fits(start, seq, n)
@@ -108,20 +111,26 @@ class Sealing:
         anew with the sequence number that `next_seq` gives: sealed under its old number, its
         content must never change.
         """
-        if not inner or not depends_on_start(inner) or self.halted:
+        if not is_sealed(pdu):
+            return postponed(pdu, by_us), inner
+        if not inner or not depends_on_start(inner):
             return delayed(pdu, by_us), inner
-        inner = with_seq(postponed(inner, by_us), next_seq())
+        seq = next_seq()
+        if not self.may_send(start, seq, 1):
+            # Others do not use what depends on the start, as they see that it was delayed.
+            return delayed(pdu, by_us), inner
+        inner = with_seq(postponed(inner, by_us), seq)
         return self.seal(inner, start), inner
 
     def begin_anew(self) -> None:
         """Go on with another clock."""
         self._numbers.begin_anew()
-        for _, peer in self._peers:
-            peer.restart()
+        self._peers.restart()
 
     def contact(self, now: float, room: int) -> tuple[Contact, float]:
         """(our CONTACT at `now`, of at most `room` octets, when it gets a PDU of its own)."""
-        return self._contacts.record(now, room, self._peers), now + PATIENCE_S
+        offset_s = self._numbers.offset(now)
+        return self._contacts.record(now, room, self._peers, offset_s), now + PATIENCE_S
 
     @property
     def contact_due_at(self) -> float:
@@ -143,15 +152,31 @@ class Sealing:
         self._strangers.key_told(now)
         return self._keys.told(self._keys.own.key)
 
-    def install(self, keys: Sequence[Key]) -> None:
-        """Hold other keys from now on; the one in use stays until the others have the next one."""
+    def install(self, keys: Sequence[Key], loaded: Remembered) -> None:
+        """Hold other keys from now on; the one in use stays until the others have the next one.
+
+        `loaded` is what is on disk about them.
+        """
+        held = {key.kid: key.fingerprint for key in self._keys.all}
+        before = self._keys.own.key
         self._keys.install(keys)
-        self._numbers.leap_beyond(floor_of(self._remembered, self._keys))
+        for key in keys:
+            if held.get(key.kid, key.fingerprint) != key.fingerprint:
+                self._peers.change_key(key.kid)
+        self.memory.add(loaded)
+        if self._keys.own.key.fingerprint != before.fingerprint:
+            self._changed()
 
     def look(self, now: float) -> None:
         """Change to the next key if it is time."""
         heard_at = {src: peer.heard_at for src, peer in self._peers if src != self._own_id}
-        self._keys.look(now, heard_at)
+        if self._keys.look(now, heard_at):
+            self._changed()
+
+    def _changed(self) -> None:
+        """Go on with another key; nothing leaves before its floor is on disk."""
+        floor = self.memory.on_disk.floors.get(self._keys.own.key.fingerprint, 0)
+        self._numbers.change_key(floor)
 
     def notices(self, now: float) -> list[str]:
         """What a person should know, in sentences."""
@@ -161,6 +186,19 @@ class Sealing:
                 "messages of robots that have not proven to be alive are handed over, so they may "
                 'be recordings (security.unproven = "deliver")'
             )
+        if self._params.clear == "accept":
+            found.append(
+                "PDUs in the clear are accepted from robots that were never heard to seal, so "
+                'anybody can send as one of these (security.clear = "accept")'
+            )
+        found += [
+            f"robot {src} has our key and has not proven to be alive: does it hear us?"
+            for src, peer in self._peers
+            if src != self._own_id
+            and now - peer.heard_at < RECENT_S
+            and not peer.is_proven(now)
+            and now - peer.first_at > PROVES_S
+        ]
         days = self._days_left(now)
         if days < USED_UP_DAYS:
             found.append(
@@ -197,5 +235,5 @@ class Sealing:
     def _oldest(self, src: int, kid: int) -> int:
         """The least T that is taken of a source that was heard in an earlier life."""
         held = self._keys.by_kid.get(kid)
-        newest = self._remembered.newest.get(held.key.fingerprint, {}) if held else {}
+        newest = self.memory.on_disk.newest.get(held.key.fingerprint, {}) if held else {}
         return newest.get(src, 0)

@@ -9,7 +9,7 @@ from sdrlinkd.wire import KeyTold
 TELL_S = 5.0
 """Least time in s between two KEY records."""
 FORGET_S = 30.0
-MOST = 256
+MOST_NOTICES = 8
 _MENDS = "compare `sdrlinkctl key show` at both, and install one key: sdrlinkctl key install"
 
 
@@ -20,6 +20,10 @@ class _Stranger:
     """When a sealed PDU of it last did not open."""
     clear_at: float = -inf
     """When a PDU of it in the clear was last refused."""
+    late_at: float = -inf
+    """When a PDU of it last was delayed by more than it says."""
+    old_at: float = -inf
+    """When a PDU of it last had an old number."""
     told: KeyTold | None = None
     told_at: float = -inf
 
@@ -42,14 +46,24 @@ class Strangers:
         """Note that a PDU of robot `src` in the clear was refused."""
         self._of(src).clear_at = now
 
+    def late(self, src: int, now: float) -> None:
+        """Note that a PDU of robot `src` was delayed by more than it says."""
+        self._of(src).late_at = now
+
+    def old(self, src: int, now: float) -> None:
+        """Note that a PDU of robot `src` has an old number."""
+        self._of(src).old_at = now
+
     def tells(self, src: int, told: KeyTold, now: float) -> None:
         """Note a KEY record of robot `src` in the clear."""
         stranger = self._of(src)
         stranger.told, stranger.told_at = told, now
 
     def opened(self, src: int) -> None:
-        """Forget what was noted about robot `src`, as a PDU of it opens."""
-        self.by_src.pop(src, None)
+        """Forget that PDUs of robot `src` do not open, as one does."""
+        stranger = self.by_src.get(src)
+        if stranger is not None:
+            stranger.closed_at = stranger.told_at = stranger.clear_at = -inf
 
     @property
     def key_due_at(self) -> float:
@@ -74,7 +88,17 @@ class Strangers:
                     f"robot {src} sends in the clear and is not heard: give it the team's key, or "
                     'set security.clear = "accept" here'
                 )
-        return found
+            elif now - each.old_at < FORGET_S:
+                found.append(
+                    f"PDUs of robot {src} have old numbers: recordings are played, or the robot "
+                    "has lost those of its key; then make the next one: sdrlinkctl key rotate"
+                )
+            elif now - each.late_at < FORGET_S:
+                found.append(
+                    f"PDUs of robot {src} come later than they say: they are held back and "
+                    "played, or security.late_s is too small for relays and slots"
+                )
+        return found[:MOST_NOTICES]
 
     def _does_not_open(self, src: int, stranger: _Stranger, now: float) -> str:
         if self._keys is None:

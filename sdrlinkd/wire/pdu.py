@@ -75,7 +75,7 @@ def parse(data: bytes, pdu_size: int, *, is_intact: bool = False) -> Pdu:
     if first >> 4 != VERSION:
         raise PduError("rx_version", f"version {first >> 4}, this is version {VERSION}")
     if first & FLAG_SEALED:
-        raise PduError("rx_flags", "sealed (E=1), reserved in version 0")
+        raise PduError("rx_flags", "sealed (E=1)")
     n = hop_count & 0x0F
     if n == 0:
         raise PduError("rx_entry", "no entries")

@@ -6,7 +6,7 @@ import pytest
 
 from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher, Subscriber
-from sdrlinkd.keyring import create_key_file, new_key
+from sdrlinkd.keyring import KeyFile, create_key_file, new_key
 from sdrlinkd.process import Process, module
 from tests.sealing import vectors
 from tests.waiting import wait_for
@@ -46,7 +46,7 @@ def text(robot, ports, keys, mode="seal", more=""):
 @pytest.fixture
 def key_file(folder):
     path = folder / "team.key"
-    create_key_file(path, [new_key(0)])
+    create_key_file(path, new_key(0))
     return path
 
 
@@ -145,7 +145,7 @@ def test_a_restart_is_believed_again(team):
 
 @pytest.mark.parametrize(("prepare", "says"), [
     ("none", "cannot be read (No such file or directory); sdrlinkctl key install puts a key there"),
-    ("copied", "key 0 was never installed on this robot, or its numbers are lost"),
+    ("copied", "no numbers of key 0. If it was never installed on this robot: sdrlinkctl key "),
     ("open", "others can read it (mode 0644); allowed: 0600"),
     ("no state", "security.state_dir:"),
 ])  # fmt: skip
@@ -178,8 +178,37 @@ def test_key_install_says_what_is_left_to_do(write_config, folder, ports, key_fi
     path = write_config(folder, text(1, ports, folder / "keys.toml", mode="off"))
     assert run(["key", "install", str(key_file), "--config", str(path)]) == 0
     assert 'nothing is sealed yet: set mode = "seal" in [security]' in capsys.readouterr().out
-    create_key_file(folder / "another.key", [new_key(0)])
+    create_key_file(folder / "another.key", new_key(0))
     line = ["key", "install", str(folder / "another.key"), "--config", str(path)]
     assert run(line) == 2
     assert "another key with kid 0 is installed; allowed: the next key" in capsys.readouterr().err
     assert run([*line, "--replace"]) == 0
+
+
+def test_numbers_that_are_lost_are_not_begun_again(write_config, folder, ports, key_file, capsys):
+    path = write_config(folder, text(1, ports, folder / "keys.toml"))
+    line = ["key", "install", str(key_file), "--config", str(path)]
+    assert run(line) == 0
+    assert run(line) == 0
+    for each in (folder / "state" / "sdrlinkd").glob("*.json"):
+        each.unlink()
+    for again in (line, ["key", "install", "--config", str(path)]):
+        capsys.readouterr()
+        assert run(again) == 2
+        assert "numbers of key 0 were here and are lost" in capsys.readouterr().err
+    # With the next key, all is well.
+    assert run(["key", "rotate", str(folder / "next.key"), "--config", str(path)]) == 0
+    assert (
+        run(["key", "install", "--replace", str(folder / "next.key"), "--config", str(path)]) == 0
+    )
+
+
+def test_a_file_with_too_many_keys_is_not_written(write_config, folder, ports, key_file, capsys):
+    path = write_config(folder, text(1, ports, folder / "keys.toml"))
+    assert run(["key", "install", str(key_file), "--config", str(path)]) == 0
+    before = (folder / "keys.toml").read_bytes()
+    two = folder / "two.key"
+    create_key_file(two, KeyFile(key=[*new_key(1).key, *new_key(2).key]))
+    assert run(["key", "install", str(two), "--config", str(path)]) == 2
+    assert "3 keys; allowed: the one in use and the next one" in capsys.readouterr().err
+    assert (folder / "keys.toml").read_bytes() == before

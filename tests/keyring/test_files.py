@@ -5,6 +5,7 @@ import pytest
 from sdrlinkd.errors import UserError
 from sdrlinkd.keyring import (
     CREDENTIAL,
+    KeyFile,
     StoredKey,
     create_key_file,
     load_keys,
@@ -34,19 +35,19 @@ def written(tmp_path):
 
 
 def test_what_is_written_is_read(tmp_path):
-    keys = [new_key(0), new_key(3)]
+    keys = KeyFile(key=[*new_key(0).key, *new_key(3).key])
     create_key_file(tmp_path / "new", keys)
     assert read_key_file(tmp_path / "new") == keys
     assert (tmp_path / "new").stat().st_mode & 0o777 == 0o600
-    assert len(keys[0].secret) == 32
-    assert keys[0].secret != keys[1].secret
+    assert len(keys.key[0].secret) == 32
+    assert keys.key[0].secret != keys.key[1].secret
 
 
 def test_a_key_is_never_overwritten(tmp_path):
-    create_key_file(tmp_path / "new", [new_key(0)])
+    create_key_file(tmp_path / "new", new_key(0))
     before = (tmp_path / "new").read_bytes()
     with pytest.raises(UserError, match="there already"):
-        create_key_file(tmp_path / "new", [new_key(0)])
+        create_key_file(tmp_path / "new", new_key(0))
     assert (tmp_path / "new").read_bytes() == before
 
 
@@ -54,7 +55,7 @@ def test_no_symlink_is_followed(tmp_path):
     (tmp_path / "target").write_text("precious")
     (tmp_path / "link").symlink_to(tmp_path / "target")
     with pytest.raises(UserError):
-        create_key_file(tmp_path / "link", [new_key(0)])
+        create_key_file(tmp_path / "link", new_key(0))
     assert (tmp_path / "target").read_text() == "precious"
 
 
@@ -106,13 +107,12 @@ def test_pair_keys(written):
     assert key.pairs == {frozenset((1, 2)): bytes(range(32, 64))}
 
 
-def test_pair_keys_stay_with_their_keys(written):
+def test_pair_keys_are_written(written):
     path = written(GOOD + f'[[pair]]\nkid = 0\nrobots = [1, 2]\nsecret = "{PAIR}"\n')
-    keys = read_key_file(path)
-    write_key_file(path, [*keys, new_key(1)], None)
-    assert [len(key.pairs) for key in load_keys(path)] == [1, 0]
-    write_key_file(path, read_key_file(path)[1:], None)
-    assert [len(key.pairs) for key in load_keys(path)] == [0]
+    read = read_key_file(path)
+    write_key_file(path, read, None)
+    assert read_key_file(path) == read
+    assert [len(key.pairs) for key in load_keys(path)] == [1]
 
 
 def test_a_systemd_credential_comes_first(written, tmp_path, monkeypatch):
@@ -121,7 +121,7 @@ def test_a_systemd_credential_comes_first(written, tmp_path, monkeypatch):
     folder.mkdir()
     monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(folder))
     assert load_keys(path)[0].kid == 0
-    create_key_file(folder / CREDENTIAL, [new_key(2)])
+    create_key_file(folder / CREDENTIAL, new_key(2))
     assert load_keys(path)[0].kid == 2
 
 

@@ -31,16 +31,29 @@ def kept(tmp_path):
 
 
 def test_what_is_saved_is_loaded(kept):
-    told = Remembered({KEY.fingerprint: 77}, {KEY.fingerprint: {2: 5, 3: 6}}, KEY.fingerprint)
+    told = Remembered(
+        {KEY.fingerprint: 77}, {KEY.fingerprint: {2: 5, 3: 6}}, KEY.fingerprint,
+        known=frozenset({2, 3}),
+    )  # fmt: skip
     kept.save(told)
     assert KeyState(kept.directory, 1).load([KEY]) == told
 
 
 def test_a_key_that_was_never_installed_is_refused(kept):
-    with pytest.raises(UserError, match="key 1 was never installed on this robot"):
+    with pytest.raises(UserError, match=r"no numbers of key 1\. If it was never installed"):
         kept.load([KEY, NEXT])
     with pytest.raises(UserError, match="never installed"):
         KeyState(kept.directory, 2).load([KEY])
+
+
+def test_what_was_replaced_stays_so_and_who_sealed_once_is_known_under_any_key(kept):
+    kept.install(NEXT, None)
+    newest = {KEY.fingerprint: {9: 5}, NEXT.fingerprint: {}}
+    retired = frozenset({KEY.fingerprint})
+    floors = {KEY.fingerprint: 5, NEXT.fingerprint: 7}
+    kept.save(Remembered(floors, newest, NEXT.fingerprint, retired))
+    assert kept.load([KEY, NEXT]).retired == retired
+    assert kept.load([NEXT]).known == {9}
 
 
 def test_to_install_again_changes_nothing(kept):

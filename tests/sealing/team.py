@@ -72,8 +72,9 @@ class Robot:
         chance = Random(1000 * self.id + self.lives)
         self.sealing = None
         if self.params.mode != "off":
+            keys = [key for key in self.keys if key.fingerprint not in self.disk.retired]
             self.sealing = Sealing(
-                self.id, self.pdu_size, self.params, self.keys, self.disk, chance.randbytes
+                self.id, self.pdu_size, self.params, keys, self.disk, chance.randbytes
             )
         self.link = Link(
             LinkParams(pdu_size=self.pdu_size, hop_limit=self.hop_limit),
@@ -98,6 +99,12 @@ class Robot:
             react_s=STEP_S,
         )
         self.link.attach(traits, self.access, RateParams())
+
+    def install(self, keys: list[Key]) -> None:
+        """Hold other keys from now on, with what is on disk about them."""
+        self.keys = keys
+        floors = {key.fingerprint: self.disk.floors.get(key.fingerprint, 0) for key in keys}
+        self.sealing.install(keys, self.disk._replace(floors=floors))
 
     def stop(self) -> None:
         self.is_on = False

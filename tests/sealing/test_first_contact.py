@@ -1,9 +1,11 @@
 """First contact: who is believed, how soon, and by whom never."""
 
+import struct
+
 import pytest
 
 from sdrlinkd.link import AccessParams, RelayParams
-from sdrlinkd.sealing import SecurityParams
+from sdrlinkd.sealing import Remembered, SecurityParams
 from tests.sealing.team import KEY, NEXT, Robot, Team
 
 CDR = b"\0\1\0\0"
@@ -177,8 +179,9 @@ def test_another_robot_with_our_id_and_key_stops_us():
     # It is older than our start, so it may be a recording of ourselves.
     team.robots[1].hear(old_life, team.now)
     assert security(team, 1).halted == ""
-    double.sealing._numbers.leap_beyond(32 * 60)  # as after a year
-    double.write(clone.now)
+    # As after a minute of use.
+    double.disk = Remembered({KEY.fingerprint: 32 * 60}, {}, KEY.fingerprint)
+    double.start(clone.now)
     clone.run(12.0)
     team.robots[1].hear(clone.on_air[-1][2], team.now)
     assert "another robot has our id 1 and our key" in security(team, 1).halted
@@ -188,3 +191,56 @@ def test_another_robot_with_our_id_and_key_stops_us():
     team.robots[1].start(team.now)
     team.run(0.5)
     assert security(team, 1).halted == ""
+
+
+@pytest.mark.parametrize("off_s", [15.0, 25.0, 70.0])
+def test_after_an_outage_one_way_messages_come_again_at_once(off_s):
+    """The receiver has to ask for a proof again, and the sender does not know."""
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY]))
+    team.run(3.0)
+    team.tamper = lambda receiver, _: receiver != 2
+    team.run(off_s)
+    team.tamper = lambda *_: True
+    back_at, sent = team.now, 0
+    for _ in range(200):
+        sent += 1
+        send(team, 1, sent.to_bytes(2, "big"))
+        team.run(0.05)
+    assert [each.payload[4:] for each in team.robots[2].heard] == [
+        n.to_bytes(2, "big") for n in range(1, sent + 1)
+    ]
+    assert team.robots[2].heard[0].at - back_at < 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("pdu_size", "robots"), [(46, 8), (64, 16)])
+def test_many_robots_in_small_pdus_stay_proven(pdu_size, robots):
+    team = Team(*(Robot(each, [KEY], pdu_size=pdu_size) for each in range(1, robots + 1)))
+    team.run(20.0)
+    before = [dropped(team, each).get("sec_unproven", 0) for each in team.robots]
+    for _ in range(35):
+        team.run(2.0)
+        for robot in team.robots.values():
+            assert len(security(team, robot.id).proven) == robots - 1
+    assert [dropped(team, each).get("sec_unproven", 0) for each in team.robots] == before
+
+
+def test_drift_of_hours_gains_nothing():
+    """One direction is jammed; the other is delayed by as much as the clocks drift apart."""
+    team = Team(Robot(1, [KEY], drift=-2e-4), Robot(2, [KEY], drift=2e-4))
+    team.run(3.0)
+    began = team.now
+
+    def tamper(receiver, data):
+        if receiver == 2:
+            team.plays_at(team.now + 4e-4 * (team.now - began), 2, data)
+        return False
+
+    team.tamper = tamper
+    for _ in range(20):
+        team.run(40.0)
+        send(team, 1, struct.pack(">d", team.now), topic_id=0)
+        team.run(1.0)
+    for each in team.robots[2].heard:
+        (sent_at,) = struct.unpack(">d", each.payload[4:])
+        assert each.age_s >= each.at - sent_at - 0.135

@@ -4,8 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import AccessParams, Outcome
-from sdrlinkd.sealing import SecurityParams
-from sdrlinkd.wire import parse_sealed
+from sdrlinkd.sealing import Key, SecurityParams
+from sdrlinkd.sealing.ciphers import Ciphers
+from sdrlinkd.wire import KeyTold, delayed, parse, parse_sealed, read_control_entries
 from tests.laws import law
 from tests.sealing.team import KEY, Robot, Team
 from tests.sealing.vectors import with_crc
@@ -88,3 +89,71 @@ def test_a_burst_that_comes_back_is_sealed_once():
     assert len(heard) > 40
     assert all(each.age_s > 0.0 for each in heard)
     assert team.robots[2].link.audit() == team.robots[1].link.audit() == []
+
+
+def test_what_was_held_on_its_way_sets_no_clock_and_no_schedule():
+    """An attacker can hold a PDU and say so; nobody vouches for the exact time."""
+    access = AccessParams(policy="tdma", nodes=[1, 2], slot_s=0.025, guard_s=0.002, reuse=False)
+    team = Team(*(Robot(each, [KEY], access=access) for each in (1, 2)))
+
+    def hold(receiver, data):
+        team.plays_at(team.now + 0.1, receiver, delayed(data, 100_000))
+        return False
+
+    team.tamper = hold
+    two = team.robots[2]
+    for number in range(200):
+        team.robots[1].link.submit(0, CDR + bytes([number]), team.robots[1].clock(team.now))
+        team.run(0.05)
+    assert len(two.heard) > 50
+    assert min(each.age_s for each in two.heard) >= 0.1
+    assert two.link.clock_estimate(1, two.clock(team.now)) is None
+    assert "schedule of robot 2" in two.link.report(two.clock(team.now)).access
+
+
+def test_entries_that_contradict_themselves_are_refused_although_they_open():
+    team, sent = spoken()
+    robot = team.robots[2]
+    last = max(parse_sealed(data, SIZE).ticks for data in sent)
+    ciphers = Ciphers(KEY, "seal")
+    for n in (1, 2, 15):
+        for octet in (0x00, 0xFF):
+            body = bytes([1, 1, 255, n * 16 + octet % 2, 0x10 + n])
+            inner = body + bytes([octet]) * (SIZE - 14 - len(body))
+            data = delayed(ciphers.seal(inner, last), 1000)
+            robot.hear(data, team.now)
+    assert robot.link.report(robot.clock(team.now)).rx.pdus_dropped["rx_entry"] >= 3
+    assert robot.link.audit() == []
+
+
+def test_a_clear_pdu_that_comes_back_stays_readable():
+    """The KEY record of a robot with another key, in a burst that was late."""
+    team = Team(Robot(1, [KEY]), Robot(2, [Key(0, bytes(32))]))
+    outcomes = iter([Outcome.LATE, Outcome.SENT] * 1000)
+    team.outcome = lambda: next(outcomes)
+    team.run(12.0)
+    clear = [data for _, _, data in team.on_air if not data[0] & 1]
+    assert len(clear) >= 2
+    for data in clear:
+        (told,) = read_control_entries(parse(data, SIZE)).records
+        assert isinstance(told, KeyTold)
+
+
+def test_a_disk_that_does_not_answer_stops_sealing_and_nothing_else():
+    """Not even a burst that comes back, and would be made anew, breaks anything."""
+    access = AccessParams(policy="tdma", nodes=[1, 2], slot_s=0.025, guard_s=0.002, reuse=False)
+    team = Team(*(Robot(each, [KEY], access=access) for each in (1, 2)))
+    team.run(3.0)
+    robot = team.robots[1]
+    robot.write = lambda _: None
+    outcomes = iter([Outcome.LATE, Outcome.LATE, Outcome.SENT] * 100_000)
+    team.outcome = lambda: next(outcomes)
+    for _ in range(90):
+        robot.link.submit(0, CDR, robot.clock(team.now))
+        team.run(1.0)
+    report = robot.link.report(robot.clock(team.now))
+    assert "the disk does not take the numbers" in report.security.halted
+    (floor,) = robot.disk.floors.values()
+    mine = [parse_sealed(data, SIZE).ticks for _, src, data in team.on_air if src == 1]
+    assert max(mine) < floor
+    assert robot.link.audit() == []

@@ -32,6 +32,8 @@ class Machine:
         self.restart([KEY])
 
     def restart(self, keys):
+        usable = [key for key in keys if key.fingerprint not in self.disk.retired]
+        keys = usable or [key for key in (KEY, NEXT) if key.fingerprint not in self.disk.retired]
         self.sealing = Sealing(1, SIZE, SEALED, keys, self.disk, lambda n: bytes(n))
         self.now, self.last = 0.0, []
 
@@ -82,7 +84,10 @@ class Machine:
         elif kind == "anew":
             self.sealing.begin_anew()
         elif kind == "install":
-            self.sealing.install(value)
+            floors = {key.fingerprint: self.disk.floors.get(key.fingerprint, 0) for key in value}
+            self.sealing.install(value, self.disk._replace(floors=floors))
+            # What is sent before the disk is asked again.
+            self.send(5)
         elif kind == "restart":
             self.restart(value)
 
@@ -94,7 +99,7 @@ def test_no_number_is_used_twice(script):
     for event in script:
         machine.do(*event)
     machine.disk_is = "works"
-    machine.do("restart", [KEY])
+    machine.do("restart", [KEY, NEXT])
     before = len(machine.used)
     machine.do("send", 10)
     assert len(machine.used) == before + 10

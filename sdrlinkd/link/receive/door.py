@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.receive.acceptance import Acceptance
+from sdrlinkd.link.receive.neighbors import Neighbors
 from sdrlinkd.link.receive.rx_ledger import RxLedger
 from sdrlinkd.sealing import InTheClear, Opened, Sealing
 from sdrlinkd.wire import is_sealed
@@ -36,6 +37,9 @@ class Admitted(NamedTuple):
     """Whether a schedule in it may be followed."""
     ticks: int | None = None
     """The T of a sealed PDU, which distinguishes it from others with its sequence number."""
+    is_held: bool = False
+    """Whether it was held on its way. Nobody vouches for that, nor for the hops left, so what
+    depends on the burst's time does not count then."""
 
 
 class _Waiting(NamedTuple):
@@ -50,8 +54,10 @@ class Door:
     """Admits PDUs to the inbox, in order, and counts those that it refuses."""
 
     def __init__(
-        self, sealing: Sealing | InTheClear, acceptance: Acceptance, ledger: RxLedger
-    ) -> None:
+        self, sealing: Sealing | InTheClear, acceptance: Acceptance, ledger: RxLedger,
+        neighbors: Neighbors,
+    ) -> None:  # fmt: skip
+        self._neighbors = neighbors
         self._sealing = sealing
         self._opener = sealing.opener
         self._acceptance = acceptance
@@ -72,9 +78,15 @@ class Door:
             opened = self._opener.open(data, at)
         except PduError as error:
             self._refuse(error.reason)
+            neighbor = self._neighbors.get(data[1]) if error.reason == "rx_dup" else None
+            if neighbor is not None:
+                neighbor.count_duplicate()
             return []
         src = opened.src
-        pdu = Admitted(opened.inner, data, at, snr_db, ended_at, ticks=opened.ticks)
+        is_held = opened.held_s > 0
+        pdu = Admitted(
+            opened.inner, data, at, snr_db, ended_at, ticks=opened.ticks, is_held=is_held
+        )
         if opened.is_proven:
             self._schedules_until.pop(src, None)
             return [*self._release(src, now), pdu] if src in self._waiting else [pdu]
@@ -109,7 +121,14 @@ class Door:
             else:
                 released.append(
                     Admitted(
-                        opened.inner, raw, at, snr_db, ended_at, was_seen=True, ticks=opened.ticks
+                        opened.inner,
+                        raw,
+                        at,
+                        snr_db,
+                        ended_at,
+                        was_seen=True,
+                        ticks=opened.ticks,
+                        is_held=opened.held_s > 0,
                     )
                 )
         return released

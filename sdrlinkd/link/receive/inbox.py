@@ -182,7 +182,7 @@ class Inbox:
         records = control.records
         if self._has_numbers:
             pdu, records = numbered(pdu), [with_topic(record) for record in records]
-        return pdu, control, records, pdu.hop < self._hop_limit
+        return pdu, control, records, pdu.hop < self._hop_limit or admitted.is_held
 
     def _glance(self, admitted: Admitted) -> list[Event]:
         """The events that follow from the presence of a PDU whose source is not proven."""

@@ -51,7 +51,7 @@ class Reception:
             registry, inflated, max_expanded, sealing.opener.delivers_unproven, sealing.is_on
         )
         self._ledger = RxLedger(topics)
-        self._door = Door(sealing, self._acceptance, self._ledger)
+        self._door = Door(sealing, self._acceptance, self._ledger, self.neighbors)
         completion = Completion(topics, self._acceptance, self._ledger, self.neighbors)
         self._inbox = Inbox(
             params, reassembly, registry, own_id, hears_self, self.neighbors, self._relay,

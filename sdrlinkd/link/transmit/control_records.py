@@ -1,6 +1,6 @@
 """Times the sending of control records: in spare room, or in PDUs with a bounded share of airtime.
 
-It handles seven kinds of records: beacons (with digest, link reports and WAITS), the schedule of
+It handles several kinds of records: beacons (with digest, link reports and WAITS), the schedule of
 the access policy (FRAME), clocks (CLOCK), RECEIPTs, declarations (TOPIC), what consumers here
 subscribe to (WANTED), and the proof that we are alive (CONTACT). Each record is made when it is
 due, uses spare room in a broadcast PDU, and from a certain time on gets its own PDU. Such a PDU
@@ -211,7 +211,8 @@ class ControlRecords:
 
     def _offer_contact(self, now: float) -> None:
         if now >= self._sealing.contact_due_at:
-            self._piggyback.put(*self._sealing.contact(now, self._room))
+            contact, alone_at = self._sealing.contact(now, self._room)
+            self._piggyback.put(contact, self._alone_from(alone_at))
 
     def _offer_topics(self, now: float) -> None:
         self._told_version = self._teller.topics.version
