@@ -227,7 +227,7 @@ def test_many_robots_in_small_pdus_stay_proven(pdu_size, robots):
 
 def test_drift_of_hours_gains_nothing():
     """One direction is jammed; the other is delayed by as much as the clocks drift apart."""
-    team = Team(Robot(1, [KEY], drift=-2e-4), Robot(2, [KEY], drift=2e-4))
+    team = Team(Robot(1, [KEY], drift=2e-4), Robot(2, [KEY], drift=-2e-4))
     team.run(3.0)
     began = team.now
 
