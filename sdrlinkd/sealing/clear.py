@@ -32,10 +32,6 @@ class ClearOpener:
         """Whether a PDU was delayed by more than it says: nothing tells."""
         return False
 
-    def is_proven(self, src: int, now: float) -> bool:  # noqa: ARG002  # as in Opener
-        """Whether a robot has proven to be alive: nothing tells, so all are believed."""
-        return True
-
     def refuses_clear(self, data: bytes, now: float) -> bool:
         """Whether a PDU in the clear is refused: never; a KEY record in it is noted."""
         key = clear_key_in(data, self._pdu_size)

@@ -115,7 +115,7 @@ class Opener:
         if self._keys.is_changing:
             self._keys.rotation.opened(src, kid, at)
         if is_own:
-            self._has_double(ticks, seq)
+            self._look_for_double(kid, ticks, seq)
             if not self._hears_self:
                 raise PduError("rx_own", "our own source id")
         elif (_CONTACT_MARK in text or _KEY_MARK in text) and _has_records(inner):
@@ -136,10 +136,6 @@ class Opener:
         """Whether a PDU of robot `src`, which is proven, was delayed by more than it says."""
         return self._peers.of(src).is_late(lead_s, held_s, self._limit_s, is_judged=True)
 
-    def is_proven(self, src: int, now: float) -> bool:
-        """Whether robot `src` has proven to be alive."""
-        return self._peers.of(src).is_proven(now)
-
     def refuses_clear(self, data: bytes, now: float) -> bool:
         """Whether an intact PDU in the clear is refused; a KEY record in it is noted."""
         if len(data) != self._pdu_size or crc16(data):
@@ -155,9 +151,12 @@ class Opener:
         self._strangers.clear(src, now)
         return True
 
-    def _has_double(self, ticks: int, seq: int) -> None:
-        """Note whether a PDU under our own id is another robot's."""
-        if self._numbers.is_foreign(ticks, seq):
+    def _look_for_double(self, kid: int, ticks: int, seq: int) -> None:
+        """Note whether a PDU under our own id is another robot's.
+
+        Under the key before, it may be a recording of ours.
+        """
+        if kid == self._keys.own.key.kid and self._numbers.is_foreign(ticks, seq):
             self.has_double = True
 
     def _closed(self, reason: str, src: int, dst: int, kid: int, at: float) -> PduError:

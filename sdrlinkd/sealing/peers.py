@@ -157,13 +157,14 @@ class Peer:
 
         A delay of less than `-limit_s` shows that the source's clock has begun anew.
         """
-        if kid != self._kid:
-            # With another key, the source's clock may have begun anew, and then comes much later.
-            is_other = abs(lead_s - self.least.value) > CHANGED_S
-            self._kid = kid
-            if is_other:
-                self.restart()
         proof, ended = self._proof, False
+        if kid != self._kid:
+            # With another key, the source's clock may have begun anew.
+            self._kid = kid
+            if abs(lead_s - self.least.value) > CHANGED_S:
+                ended = proof is not None
+                proof = None
+                self.restart()
         if proof is not None:
             if lead_s + proof.ahead_s < -limit_s:
                 self.restart()

@@ -1,6 +1,7 @@
 """Sealing as one object: seals our PDUs, and holds all that opening those of others needs."""
 
 from collections.abc import Callable, Sequence
+from math import inf
 
 from sdrlinkd.reports import SecurityReport
 from sdrlinkd.sealing.contacts import PATIENCE_S, Contacts
@@ -31,6 +32,8 @@ USED_UP_DAYS = 30.0
 """Days before the end of a key from which a person is told."""
 RECENT_S, PROVES_S = 10.0, 5.0
 """A robot heard in the last RECENT_S should be proven PROVES_S after it was heard first."""
+SLOW_S = 1.0
+"""Time in s for which the disk may be busy before a person is told."""
 FORGOTTEN_S = 60.0
 """Time in s after which a robot is left out of the report."""
 
@@ -69,6 +72,8 @@ class Sealing:
         self.memory = Memory(remembered, self._keys, self._numbers, self._peers)
         self._waits = 0
         self._is_used_up = self._is_out = False
+        self._out_since = inf
+        """Since when no number is left that is on disk."""
 
     @property
     def halted(self) -> str:
@@ -88,7 +93,13 @@ class Sealing:
     def may_send(self, start: float, seq: int, n: int) -> bool:
         """Whether a burst at `start` can hold `n` PDUs of ours from `seq` on."""
         self._is_used_up = self._numbers.is_used_up(start)
-        self._is_out = self._numbers.is_out(start)
+        if not self._numbers.is_out(start):
+            self._out_since = inf
+        elif self._out_since == inf:
+            self._out_since = start
+        # With another key, the disk has a moment to take its floor.
+        out_s = start - self._out_since
+        self._is_out = out_s >= 0 and (bool(self.memory.failed) or out_s > SLOW_S)
         if self.halted:
             return False
         fits = self._numbers.fits(start, seq, n)

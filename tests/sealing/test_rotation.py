@@ -144,3 +144,19 @@ def test_a_key_that_comes_back_goes_on_behind_its_floor():
     used = [parse_sealed(data, 128) for _, src, data in team.on_air[n:] if src == 1]
     assert used
     assert all(pdu.ticks >= 32 * 5000 for pdu in used if pdu.kid == NEXT.kid)
+
+
+def test_a_recording_of_our_own_under_the_key_before_does_not_stop_us():
+    begin = N_TICKS // 2 + 32 * 1000
+    disk = Remembered({KEY.fingerprint: begin}, {}, KEY.fingerprint)
+    team = Team(*(Robot(each, [KEY], disk=disk) for each in (1, 2)))
+    team.run(3.0)
+    own = [data for _, src, data in team.on_air if src == 1]
+    for robot in team.robots.values():
+        robot.install([KEY, NEXT])
+    team.run(5.0)
+    robot = team.robots[1]
+    assert kid_in_use(robot, team.now) == 1
+    for data in own:
+        robot.hear(data, team.now)
+    assert robot.link.report(robot.clock(team.now)).security.halted == ""
