@@ -52,8 +52,8 @@ def test_a_crowd_of_silent_programs_ends_nothing(start_daemon):
     context = zmq.Context()
     context.set(zmq.MAX_SOCKETS, 4096)
     try:
-        for _ in range(LEAST):
-            silent = context.socket(zmq.SUB)
+        crowd = [context.socket(zmq.SUB) for _ in range(LEAST)]
+        for silent in crowd:
             silent.connect(endpoint(daemon.directory, OUT_SOCKET))
         wait_for(lambda: "descriptors were in use" in daemon.log())
     finally:
