@@ -287,7 +287,8 @@ def test_a_radio_that_comes_late_is_waited_for(start_daemon, bus):
     air_.inject(1, "unplug")
     robots = [start_daemon(on_soapy(robot, name)) for robot in (1, 2)]
     late, other = robots
-    wait_for(lambda: late.snapshot().carrier.state == "waiting", 60)
+    wait_for(lambda: "no radio, still trying: soapy.device" in late.log(), 60)
+    assert late.snapshot().carrier.state == "waiting"
     up([other])
     with (
         Subscriber("/rx_robot_1/odom", directory=other.directory) as listener,
@@ -306,7 +307,6 @@ def test_a_radio_that_comes_late_is_waited_for(start_daemon, bus):
         assert message.age_us * 1e-6 <= waited_s + 1.0
     assert_whole(late)
     wait_for(lambda: "the radio is up after" in late.log())
-    assert "no radio, still trying: soapy.device" in late.log()
 
 
 LINK_S = 5.0
