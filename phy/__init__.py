@@ -15,11 +15,12 @@ from phy.error_rate import (
     pdu_error_rate,
     pdu_lost_rate,
 )
+from phy.expected import Expected
 from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
 from phy.layout import BurstLayout, layout, most_pdus
 from phy.mcs import MCS_TABLE, Mcs
 from phy.numerology import GRIDS, OFDM_64_8, OFDM_64_16, Numerology
-from phy.quality import COUNTERS, BurstOver, BurstQuality, Event, PduHeard
+from phy.quality import COUNTERS, BurstOver, BurstQuality, Claim, Event, PduHeard
 from phy.sizes import SENSE_WINDOW
 
 if TYPE_CHECKING:
@@ -46,11 +47,13 @@ __all__ = [
     "BurstLayout",
     "BurstOver",
     "BurstQuality",
+    "Claim",
     "Downsampler",
     "EnergyDetector",
     "Engine",
     "EngineError",
     "Event",
+    "Expected",
     "FrontEnd",
     "FrontEndParams",
     "Mcs",

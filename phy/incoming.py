@@ -2,6 +2,9 @@
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from phy import compute
 from phy.acquisition import Acquired
 from phy.estimation import tones
@@ -11,6 +14,10 @@ from phy.tables.burst import SLOPE
 
 SLIP_EVERY = 256
 """Interval in payload symbols at which the FFT windows are aligned to the sender's clock."""
+
+# When a PDU fails and the power above the noise is below this share of the burst's, the burst has
+# ended.
+_FADED = 0.25
 
 
 class IncomingBurst:
@@ -44,6 +51,11 @@ class IncomingBurst:
         # At the limit all symbols are processed, even those of an incomplete PDU: the windows slip
         # there.
         return (here if here == self._limit else plan.symbols_through(done + n_pdus)), n_pdus
+
+    def is_gone(self, powers: NDArray[np.float32]) -> bool:
+        """Whether the burst has ended, by the `powers` of the symbols of a PDU that failed."""
+        channel = self.acquired.channel.content
+        return len(powers) > 0 and bool(powers.mean() < channel.no + _FADED * channel.gain)
 
     def go_on(self) -> None:
         """Prepare for the next symbols; slip the windows if that is due."""

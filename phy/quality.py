@@ -1,5 +1,6 @@
 """The events that a receiver reports, and the names of its counters."""
 
+from math import inf
 from typing import NamedTuple
 
 
@@ -43,6 +44,17 @@ class BurstOver(NamedTuple):
     ending: str
 
 
+class Claim(NamedTuple):
+    """The air that a burst takes, by its header: absolute indices, and the SNR of its preamble.
+
+    The claim of a burst whose power vanished ends there.
+    """
+
+    start: int
+    end: int
+    snr_db: float = -inf
+
+
 Event = PduHeard | BurstOver
 
 COUNTERS = (
@@ -51,7 +63,9 @@ COUNTERS = (
     "gaps",
     "triggers",
     "preambles",
+    "peaks_skipped",
     "headers_bad",
+    "headers_refused",
     "bursts",
     "bursts_foreign",
     "bursts_faded",

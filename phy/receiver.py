@@ -13,35 +13,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy import compute, preamble
-from phy.acquisition import Acquired, Acquisition, Missed, before, needed_after
+from phy.acquisition import Acquisition, Missed, before, needed_after
 from phy.constellation import Modulation
 from phy.demodulation import Demodulator, PduDecoder
-from phy.header import N_NETWORKS, n_symbols
+from phy.expected import Expected
+from phy.header import n_symbols
 from phy.incoming import SLIP_EVERY, IncomingBurst
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
-from phy.quality import BurstOver, Event, PduHeard
+from phy.quality import BurstOver, Claim, Event, PduHeard
+from phy.screening import Screening
 from phy.states import Found, State, after
 from phy.stream import SampleStream
 from phy.tables.acquisition import BACKOFF
-from phy.tables.detector import FORGETS, HISTORY, new_search_memory
+from phy.tables.detector import HISTORY, new_search_memory
+from phy.wariness import THRESHOLD, Wariness
 
 HOP = 512
 ALIGN_SPAN = preamble.SHORT
-THRESHOLD = 0.25
-MOST = 0.5
-"""Limit for thresholds raised by false alarms: a burst as strong as all else together."""
 PLAINEST = 0.7
 """A peak at least this strong without the preamble's code is not a preamble."""
-# Amount by which a false alarm raises the threshold.
-_WARIER = 0.1
 # Number of samples after a false alarm at which the search continues.
 RETRY_AFTER = 16
 # Maximum number of samples processed at once, to limit memory on large calls.
 PIECE = 1 << 16
-# When a PDU fails and the power above the noise is below this share of the burst's, the burst has
-# ended.
-_FADED = 0.25
 
 
 class Receiver:
@@ -51,7 +46,8 @@ class Receiver:
     networks than `network` are reported but not decoded; None accepts all. `centre_cycles` is the
     centre frequency in cycles per sample, if senders derive centre frequency and sample rate from
     one crystal: then the frequency offset also gives the error of the sampling clock. 0: unknown.
-    `on_points` gets the equalised points `[n, n_data]` of payload symbols, for plots.
+    `on_points` gets the equalised points `[n, n_data]` of payload symbols, for plots. `expected`
+    bounds what headers may claim; None believes all.
     """
 
     def __init__(
@@ -62,10 +58,9 @@ class Receiver:
         start: int = 0,
         centre_cycles: float = 0.0,
         on_points: Callable[[NDArray[np.complex64], Modulation], None] | None = None,
+        expected: Expected | None = None,
     ) -> None:
-        if network is not None and not 0 <= network < N_NETWORKS:
-            raise ValueError(f"network: got {network}; allowed: 0 to {N_NETWORKS - 1}")
-        self._network = network
+        self._screening = Screening(network, expected, start)
         self._grid = grid
         self._on_points = on_points
         self._acquisition = Acquisition(grid, max_frequency, centre_cycles)
@@ -90,10 +85,10 @@ class Receiver:
         # What is known in the present state about the current burst.
         self._burst: IncomingBurst | None = None
         self._crossing, self._peak, self._coarse = start, start, 0.0
-        self._excess, self._raised_at, self._began = 0.0, start, start
-        self._at = start
-        self.last_burst = (start, start)
-        """Start and expected end of the last burst whose header was read."""
+        self._wariness = Wariness(start)
+        self._at = self._began = start
+        self.claim = Claim(start, start)
+        """The air that the last header claims."""
         self.counters: Counter[str] = Counter()
         self._begin(start)
 
@@ -150,6 +145,12 @@ class Receiver:
         """Enter the state that follows what was found."""
         self._state = after(self._state, found)
 
+    def _pass_by(self, peak: int, counter: str, found: Found) -> None:
+        """Search on right behind a peak that is not followed."""
+        self.counters[counter] += 1
+        self._go(found)
+        self._at = peak + RETRY_AFTER
+
     # One step for each state; returns False when it needs more samples.
 
     def _search(self, _: list[Event]) -> bool:
@@ -159,8 +160,8 @@ class Receiver:
             return False
         first = self._at - HISTORY
         x = self._stream.view(first, self._at + n_hops * HOP)
-        age = self._at - self._raised_at
-        found = compute.search(x, n_hops, HOP, THRESHOLD, self._excess, age, self._memory)
+        wary, age = self._wariness.excess, self._at - self._wariness.raised_at
+        found = compute.search(x, n_hops, HOP, THRESHOLD, wary, age, self._memory)
         if found < 0:
             self._at += n_hops * HOP
         else:
@@ -179,6 +180,8 @@ class Receiver:
         self._peak = self._at = crossing + offset
         if plain > PLAINEST:
             self._was_nothing(self._peak)
+        elif not self._screening.allows(self._peak):
+            self._pass_by(self._peak, "peaks_skipped", Found.NOTHING)
         else:
             self._coarse = cmath.phase(p) / (2 * math.pi * preamble.SEGMENT)
             self._go(Found.PEAK)
@@ -190,9 +193,7 @@ class Receiver:
         self._at = peak + RETRY_AFTER
         # The first samples of noise after silence resemble anything.
         if peak >= self._began + preamble.SHORT:
-            left = self._excess * math.exp((self._raised_at - peak) / FORGETS)
-            self._excess = min(left + _WARIER, MOST - THRESHOLD)
-            self._raised_at = peak
+            self._wariness.false_alarm(peak)
 
     def _acquire(self, events: list[Event]) -> bool:
         """Read training and header of the burst at the preamble's peak."""
@@ -202,26 +203,28 @@ class Receiver:
             return False
         x = self._stream.view(base, base + self._span)
         found = self._acquisition.acquire(x, base, self._coarse, self._dc_value)
+        self.counters["preambles"] += not isinstance(found, Missed) or found.stage != "preamble"
         if isinstance(found, Missed):
+            self._screening.missed()
             if found.stage == "preamble":
                 self._was_nothing(peak)
-                return True
-            self._go(Found.BAD_HEADER)
-            self._at = peak + RETRY_AFTER
-            self.counters["preambles"] += 1
-            self.counters["headers_bad"] += 1
+            else:
+                self._pass_by(peak, "headers_bad", Found.BAD_HEADER)
             return True
-        self.counters["preambles"] += 1
         told = found.header
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
+        if self._screening.refuses(told, plan):
+            self._screening.missed()
+            self._pass_by(peak, "headers_refused", Found.BAD_HEADER)
+            return True
         burst = self._burst = IncomingBurst(found, plan, self._grid)
-        self._decoder.start(plan)
-        self.last_burst = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
-        if self._network is not None and told.network != self._network:
+        self.claim = self._screening.claim(found.quality, burst.end_of(plan.n_symbols) + BACKOFF)
+        if self._screening.is_foreign(told):
             # The search continues in the burst: a false header must not make the receiver deaf.
             self._end(burst, events, "foreign")
             self._go(Found.FOREIGN)
         else:
+            self._decoder.start(plan)
             self._go(Found.HEADER)
             self.counters["bursts"] += 1
             self._at = found.window
@@ -264,7 +267,7 @@ class Receiver:
                 burst.n_bad += 1
                 self.counters["pdus_bad"] += 1
                 own = self._powers[max(0, burst.n_symbols_in - first) : through - first]
-                if number + 1 < plan.n_pdus and self._is_gone(own, found):
+                if number + 1 < plan.n_pdus and burst.is_gone(own):
                     burst.n_symbols_in = through
                     self._end(burst, events, "faded")
                     self._go(Found.OVER)
@@ -280,14 +283,15 @@ class Receiver:
             self._go(Found.PDUS)
         return True
 
-    def _is_gone(self, powers: NDArray[np.float32], found: Acquired) -> bool:
-        channel = found.channel.content
-        return len(powers) > 0 and bool(powers.mean() < channel.no + _FADED * channel.gain)
-
     def _end(self, burst: IncomingBurst, events: list[Event], ending: str) -> None:
         self._burst = None
         if ending != "whole":
             self.counters[f"bursts_{ending}"] += 1
+        if ending == "faded":
+            end = burst.end_of(burst.n_symbols_in) + BACKOFF
+            self.claim = self._screening.claim(burst.acquired.quality, end)
+        if not burst.n_good:
+            self._screening.missed()
         events.append(BurstOver(burst.acquired.quality, burst.n_good, ending))
         self._at = burst.end_of(burst.n_symbols_in)
 

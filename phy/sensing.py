@@ -21,6 +21,7 @@ class EnergyDetector:
     def __init__(self, threshold_db: float = 6.0, start: int = 0) -> None:
         if not 0 < threshold_db < math.inf:
             raise ValueError(f"threshold in dB: got {threshold_db}; allowed: more than 0")
+        self.threshold_db = threshold_db
         self._threshold = 10 ** (threshold_db / 10)
         self._state = np.zeros(N_STATE)
         self._state[[BUSY_UNTIL, NEXT]] = start

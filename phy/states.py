@@ -50,7 +50,7 @@ class Found(Enum):
     NOTHING = auto()
     """The peak does not belong to a preamble."""
     BAD_HEADER = auto()
-    """There is a preamble, but its header fails its check."""
+    """There is a preamble, but its header fails its check, or tells what this link never sends."""
     FOREIGN = auto()
     """The header names another network."""
     HEADER = auto()

@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 
 from phy import preamble
 from phy.constellation import Modulation
-from phy.header import N_NETWORKS, n_symbols
+from phy.expected import Expected
+from phy.header import n_symbols
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
-from phy.quality import BurstOver, Event, PduHeard
+from phy.quality import BurstOver, Claim, Event, PduHeard
 from phy.reference.acquisition import Acquisition, Missed, before, needed_after
 from phy.reference.detection import HISTORY, HOP, Detector
 from phy.reference.offset import BACKOFF
 from phy.reference.payload import Payload
+from phy.screening import Screening
 
 ALIGN_SPAN = preamble.SHORT
 """Number of samples from the first crossing on in which the peak must lie."""
@@ -35,7 +37,8 @@ class Receiver:
     `max_frequency` is the largest frequency offset expected, in cycles per sample. Bursts of other
     networks than `network` are reported but not decoded; None accepts all. `centre_cycles` is the
     centre frequency in cycles per sample, for senders with one crystal; 0: unknown. `on_points`
-    gets the equalised points `[n, n_data]`. Raises ValueError for an impossible network.
+    gets the equalised points `[n, n_data]`. `expected` bounds what headers may claim; None believes
+    all. Raises ValueError for an impossible network.
     """
 
     # The samples kept, and the absolute index of the first one.
@@ -53,10 +56,9 @@ class Receiver:
         start: int = 0,
         centre_cycles: float = 0.0,
         on_points: Callable[[NDArray[np.complex64], Modulation], None] | None = None,
+        expected: Expected | None = None,
     ) -> None:
-        if network is not None and not 0 <= network < N_NETWORKS:
-            raise ValueError(f"network: got {network}; allowed: 0 to {N_NETWORKS - 1}")
-        self._network = network
+        self._screening = Screening(network, expected, start)
         self._grid = grid
         self._on_points = on_points
         self._acquisition = Acquisition(grid, max_frequency, centre_cycles)
@@ -69,8 +71,8 @@ class Receiver:
         self._burst: Payload | None = None
         self._crossing: int | None = None
         self._peak: tuple[int, float] | None = None
-        self.last_burst = (start, start)
-        """Start and expected end of the last burst whose header was read."""
+        self.claim = Claim(start, start)
+        """The air that the last header claims."""
         self.counters: Counter[str] = Counter()
         self._begin(start)
 
@@ -166,6 +168,8 @@ class Receiver:
         self._crossing = None
         if frequency is None:
             self._was_nothing(peak)
+        elif not self._screening.allows(peak):
+            self._pass_by(peak, "peaks_skipped")
         else:
             self._peak = (peak, frequency)
         return True
@@ -185,26 +189,34 @@ class Receiver:
             return False
         found = self._acquisition.acquire(x, base, coarse, self._detector.dc)
         self._peak = None
+        self.counters["preambles"] += not isinstance(found, Missed) or found.stage != "preamble"
         if isinstance(found, Missed):
+            self._screening.missed()
             if found.stage == "preamble":
                 self._was_nothing(peak)
-                return True
-            self._at = peak + RETRY_AFTER
-            self.counters["preambles"] += 1
-            self.counters["headers_bad"] += 1
+            else:
+                self._pass_by(peak, "headers_bad")
             return True
-        self.counters["preambles"] += 1
         told = found.header
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
+        if self._screening.refuses(told, plan):
+            self._screening.missed()
+            self._pass_by(peak, "headers_refused")
+            return True
         self._burst = burst = Payload(found, plan, self._grid, n_symbols(self._grid))
-        self.last_burst = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
-        if self._network is not None and told.network != self._network:
+        self.claim = self._screening.claim(found.quality, burst.end_of(plan.n_symbols) + BACKOFF)
+        if self._screening.is_foreign(told):
             # The search continues in the burst: a false header must not make the receiver deaf.
             self._end(burst, events, "foreign")
         else:
             self.counters["bursts"] += 1
             self._at = found.window
         return True
+
+    def _pass_by(self, peak: int, counter: str) -> None:
+        """Search on right behind a peak that is not followed."""
+        self.counters[counter] += 1
+        self._at = peak + RETRY_AFTER
 
     def _payload(self, burst: Payload, events: list[Event]) -> bool:
         """Process the symbols that have come, up to the end of a PDU, and report that PDU."""
@@ -242,5 +254,10 @@ class Receiver:
         self._burst = None
         if ending != "whole":
             self.counters[f"bursts_{ending}"] += 1
+        if ending == "faded":
+            end = burst.end_of(burst.n_symbols_in) + BACKOFF
+            self.claim = self._screening.claim(burst.acquired.quality, end)
+        if not burst.n_good:
+            self._screening.missed()
         events.append(BurstOver(burst.acquired.quality, burst.n_good, ending))
         self._at = burst.end_of(burst.n_symbols_in)

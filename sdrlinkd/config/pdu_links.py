@@ -44,7 +44,8 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     network: Annotated[int, Meta(ge=0, le=7)] = 0
     """Network number; bursts of other networks are ignored."""
     max_burst_s: Annotated[float, Meta(gt=0, le=1)] = 0.005
-    """Longest burst of several PDUs in s, and so the wait that it can cause an urgent message."""
+    """Longest burst of several PDUs in s, and so the wait that it can cause an urgent message. A
+    header that announces a longer burst is refused, so all robots have the same value."""
     tx_lead_s: Annotated[float, Meta(ge=0, le=1)] = 0.005
     """Time in s between composing a burst and its start: enough to compose and modulate it. An
     urgent message may wait for this time in addition to a burst."""

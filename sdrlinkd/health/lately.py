@@ -20,15 +20,14 @@ class Lately:
     """Counters of the snapshots of the last `RATE_WINDOW_S`, taken about once a second."""
 
     def __init__(self) -> None:
-        self._seen: deque[tuple[float, dict[str, int], int]] = deque()
+        self._seen: deque[tuple[float, dict[str, int], dict[str, int]]] = deque()
 
     def note(self, snapshot: Snapshot) -> None:
         """Add a snapshot, and drop those before the window."""
         now = snapshot.uptime_s
         while self._seen and now - self._seen[0][0] > RATE_WINDOW_S:
             self._seen.popleft()
-        lost = snapshot.carrier.counters.get("samples_lost", 0)
-        self._seen.append((now, shed_by_topic(snapshot), lost))
+        self._seen.append((now, shed_by_topic(snapshot), snapshot.carrier.counters))
 
     def shed(self, snapshot: Snapshot) -> dict[str, int]:
         """Messages dropped within the window for lack of airtime, by topic, the most first."""
@@ -39,8 +38,8 @@ class Lately:
         kept = {name: n for name, n in grown.items() if n > 0}
         return dict(sorted(kept.items(), key=lambda each: -each[1]))
 
-    def samples_lost(self, snapshot: Snapshot) -> int:
-        """Samples that the receiver lost within the window."""
+    def grown(self, snapshot: Snapshot, counter: str) -> int:
+        """Growth of a counter of the PDU link within the window."""
         if not self._seen:
             return 0
-        return snapshot.carrier.counters.get("samples_lost", 0) - self._seen[0][2]
+        return snapshot.carrier.counters.get(counter, 0) - self._seen[0][2].get(counter, 0)

@@ -163,7 +163,7 @@ class Story:
             yield Line("queue", Level.INFO, text)
 
     def _samples(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
-        lost, now = lately.samples_lost(snapshot), snapshot.uptime_s
+        lost, now = lately.grown(snapshot, "samples_lost"), snapshot.uptime_s
         if lost > 0 and self._losing_at is None:
             self._losing_at = now
             text = f"the receiver drops samples ({lost} so far): the CPU is too slow"

@@ -34,6 +34,7 @@ def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport
         return VerdictReport(level="DOWN", reasons=[down])
     reasons = [
         *_robots(snapshot, shares_air),
+        *_air(snapshot, lately),
         *_queue(snapshot, lately),
         *_machine(snapshot, lately),
     ]
@@ -97,6 +98,24 @@ def _at(snr_db: float | None) -> str:
     return "" if snr_db is None else f" at {snr_db:.0f} dB"
 
 
+def _air(snapshot: Snapshot, lately: Lately) -> list[str]:
+    """Reasons that concern what others send on this channel."""
+    reasons = []
+    skipped = lately.grown(snapshot, "peaks_skipped")
+    if skipped > 0:
+        reasons.append(
+            f"interference: {skipped} preambles skipped in {RATE_WINDOW_S:g} s, as too many before "
+            "them brought no message"
+        )
+    refused = lately.grown(snapshot, "headers_refused")
+    if refused > 0:
+        reasons.append(
+            f"{refused} headers refused in {RATE_WINDOW_S:g} s: not of this link's PDU length, or "
+            "longer than modem.max_burst_s"
+        )
+    return reasons
+
+
 def _queue(snapshot: Snapshot, lately: Lately) -> list[str]:
     shed = lately.shed(snapshot)
     if not shed:
@@ -109,7 +128,7 @@ def _queue(snapshot: Snapshot, lately: Lately) -> list[str]:
 
 def _machine(snapshot: Snapshot, lately: Lately) -> list[str]:
     pdu_link, reasons = snapshot.carrier, []
-    lost = lately.samples_lost(snapshot)
+    lost = lately.grown(snapshot, "samples_lost")
     if lost > 0:
         reasons.append(f"{lost} samples dropped in {RATE_WINDOW_S:g} s: the CPU is too slow")
     if pdu_link.clipped_pct >= CLIPPED_PCT:

@@ -42,7 +42,7 @@ def make_modem(
             wanted = RadioWanted(config, node_id, rng.getrandbits(32), longest_s, patience)
             return ModemProcess(wanted, listens, starts_s, loading.note, early)
         radio = make_radio(config, node_id, rng, longest_s, patience)
-        return ModemHere(config.modem, radio, listens, starts_s, loading)
+        return ModemHere(config.modem, config.link.pdu_size, radio, listens, starts_s, loading)
 
     return ModemLink(
         config.modem,
@@ -60,7 +60,7 @@ def modem_on(
     """A modem on `radio`, in this process."""
 
     async def choose() -> Modem:
-        return ModemHere(params, radio, listens, None, Loading())
+        return ModemHere(params, pdu_size, radio, listens, None, Loading())
 
     return ModemLink(params, pdu_size, choose, kind)
 

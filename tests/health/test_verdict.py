@@ -120,6 +120,24 @@ def test_a_machine_that_is_too_slow_and_a_receiver_that_clips():
     )
 
 
+def test_interference_and_headers_of_no_use():
+    def at(seconds, **counters):
+        return snapshot(at=seconds, carrier={"counters": counters})
+
+    assert verdict(at(1.0), at(2.0, peaks_skipped=40, headers_refused=3)) == (
+        "DEGRADED",
+        [
+            "interference: 40 preambles skipped in 5 s, as too many before them brought no message",
+            (
+                "3 headers refused in 5 s: not of this link's PDU length, or longer than "
+                "modem.max_burst_s"
+            ),
+        ],
+    )
+    over = [at(float(second), peaks_skipped=40, headers_refused=3) for second in range(3, 12)]
+    assert verdict(at(1.0), at(2.0, peaks_skipped=40), *over) == ("OK", [])
+
+
 def test_stopping_comes_first():
     level, reasons = verdict(snapshot(robots=[], state="draining"))
     assert level == "DEGRADED"

@@ -24,6 +24,7 @@ pdu_size = 64
 [modem]
 rate_hz = 1e6
 max_cfo_hz = 1e5
+max_burst_s = 0.01
 [acme]
 gain = 0.25
 """
@@ -83,10 +84,10 @@ def test_a_configuration_may_name_a_radio_of_another_package(acme):
 
 def test_its_section_is_checked_as_any_other(acme):
     assert refused(f"{ACME}gian = 1") == (
-        "f.toml:9: acme.gian: unknown key; did you mean gain? allowed: gain, hear_self"
+        "f.toml:10: acme.gian: unknown key; did you mean gain? allowed: gain, hear_self"
     )
     assert refused(ACME.replace("0.25", "2")) == (
-        "f.toml:8: acme.gain: got 2; allowed: a number above 0 and at most 1"
+        "f.toml:9: acme.gain: got 2; allowed: a number above 0 and at most 1"
     )
 
 

@@ -21,6 +21,8 @@ from sdrlinkd.modem.traits import HANDOVER_S
 from tests.waiting import wait_for
 
 SIZE = 64
+# Four PDUs fit, by the MCS of the bursts here.
+LONGEST_S = 0.01
 
 
 class Listener:
@@ -92,7 +94,7 @@ def config(paced, **more):
         link=LinkParams(pdu_size=SIZE),
         loopback=LoopbackParams(paced=paced),
         channel=more.pop("channel", ChannelParams(snr_db=15, clock_ppm=10)),
-        modem=ModemParams(**{"rate_hz": 1e6, "max_cfo_hz": 1e5, **more}),
+        modem=ModemParams(**{"rate_hz": 1e6, "max_cfo_hz": 1e5, "max_burst_s": LONGEST_S, **more}),
     )
 
 
@@ -152,7 +154,7 @@ async def test_by_default_radios_hear_each_other_however_far_their_crystals_are_
         link=LinkParams(pdu_size=SIZE),
         loopback=LoopbackParams(paced=False),
         channel=ChannelParams(snr_db=15, clock_ppm=ppm),
-        modem=ModemParams(rate_hz=rate_hz, frequency_hz=5.9e9),
+        modem=ModemParams(rate_hz=rate_hz, frequency_hz=5.9e9, max_burst_s=LONGEST_S),
     )
     async with running(air) as (modem, listener):
         send(modem, listener, sent)
@@ -214,7 +216,7 @@ async def test_without_hear_self_nothing_is_heard():
         backend="loopback",
         link=LinkParams(pdu_size=SIZE),
         loopback=LoopbackParams(paced=False, hear_self=False),
-        modem=ModemParams(rate_hz=1e6),
+        modem=ModemParams(rate_hz=1e6, max_burst_s=LONGEST_S),
     )
     async with running(deaf) as (modem, listener):
         send(modem, listener, bursts(2, 3))
@@ -226,7 +228,7 @@ async def test_a_recording_is_written_and_played(tmp_path):
     recording = str(tmp_path / "rec")
     link = LinkParams(pdu_size=SIZE)
     sent = list(bursts(9, 5))
-    modem = ModemParams(rate_hz=1e6)
+    modem = ModemParams(rate_hz=1e6, max_burst_s=LONGEST_S)
     writing = Config(
         backend="iqfile", link=link, modem=modem, channel=ChannelParams(clock_ppm=5),
         iqfile=IqFileParams(transmit=recording, format="ci8", paced=False),

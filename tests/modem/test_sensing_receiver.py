@@ -8,7 +8,7 @@ import pytest
 import phy
 from backends import RxBlock
 from sdrlinkd.link import Sensed
-from sdrlinkd.modem.process.sensing_receiver import TAIL, SensingReceiver
+from sdrlinkd.modem.process.sensing_receiver import TAIL, VANISHED, SensingReceiver
 
 RATE = 1e6
 WINDOW = phy.SENSE_WINDOW
@@ -221,3 +221,46 @@ def test_what_was_lost_is_not_taken_for_silence():
     assert not is_busy(receiving.sensed)
     assert receiving.sensed.idle_since >= (QUIET + 5000) / RATE - 1e-9
     assert receiving.sensed.burst_at is None
+
+
+LONGEST = 5000
+
+
+def of_link(network=0):
+    """The receiver of a link with PDUs of 200 B and bursts of at most 5 ms."""
+    expected = phy.Expected(200, LONGEST, every=1000)
+    return SensingReceiver(phy.Receiver(network, expected=expected), phy.EnergyDetector(), RATE)
+
+
+def silent_for(story, since):
+    """Samples after `since` in which the channel counts as busy."""
+    return max((now for now, sensed, _ in story if is_busy(sensed)), default=since) - since
+
+
+@pytest.mark.parametrize("network", [0, 3])
+@pytest.mark.parametrize("size", [200, 2047])
+def test_a_header_without_a_burst_holds_the_air_as_long_as_its_energy(network, size):
+    """Of our network or another, of our PDU length or not: 0.5 ms of air, and no more."""
+    rng = np.random.default_rng(size)
+    header = phy.Transmitter(network).modulate([rng.bytes(size)] * 3, 1)[:700]
+    story = listen(of_link(), on_air(QUIET, header, 3 * LONGEST), 50)
+    assert silent_for(story, QUIET + 700) <= VANISHED + TAIL + 50
+
+
+@pytest.mark.parametrize(("network", "size"), [(0, 200), (3, 2047)])
+def test_a_false_header_too_weak_to_be_sensed_holds_the_air_for_one_burst(network, size):
+    rng = np.random.default_rng(size)
+    header = phy.Transmitter(network).modulate([rng.bytes(size)] * 3, 0)[:700]
+    story = listen(of_link(), on_air(QUIET, header, 3 * LONGEST, snr_db=5), 50)
+    assert silent_for(story, QUIET) <= LONGEST + 50
+
+
+@pytest.mark.parametrize("snr_db", [3, 6, 9, 12, 25])
+def test_a_true_burst_is_never_given_up_for_its_energy(snr_db):
+    burst = a_burst(9, n_pdus=1)
+    end = QUIET + len(burst)
+    for seed in range(5):
+        story = listen(of_link(), on_air(QUIET, burst, QUIET, snr_db=snr_db, seed=seed), 50)
+        for now, sensed, _ in story:
+            if QUIET + HEADER_WITHIN <= now < end - 2:
+                assert is_busy(sensed), (snr_db, seed, now)

@@ -115,8 +115,8 @@ class _Served:
                 config, start.node_id, rng, start.longest_s, start.patience, os.getppid()
             )
             modem = self._modem = ModemHere(
-                config.modem, radio, start.listens, start.began_s, self._loading, _at_once,
-                self._show, lambda: self._page.wakes,
+                config.modem, config.link.pdu_size, radio, start.listens, start.began_s,
+                self._loading, _at_once, self._show, lambda: self._page.wakes,
             )  # fmt: skip
             can = await modem.open()
             if can.lockstep:

@@ -25,6 +25,9 @@ from sdrlinkd.modem.process.sensing_receiver import SensingReceiver
 from sdrlinkd.modem.process.transmission import Transmission
 from sdrlinkd.pdulink import Heard
 
+MISSES_PER_S = 1000
+"""Acquisitions a second that may bring nothing: a tenth of a core."""
+
 
 async def forever() -> NoReturn:
     """Wait until cancelled."""
@@ -45,6 +48,7 @@ class ModemHere:
     def __init__(
         self,
         params: ModemParams,
+        pdu_size: int,
         radio: Radio,
         listens: bool,
         began_s: float | None,
@@ -54,6 +58,7 @@ class ModemHere:
         asks: Callable[[], bool] | None = None,
     ) -> None:
         self._params = params
+        self._pdu_size = pdu_size
         self._began_s = began_s
         self._radio = radio if began_s is None else LateRadio(radio, self._first_index)
         self._listens = listens
@@ -135,6 +140,7 @@ class ModemHere:
             params.searched_cfo_hz / params.rate_hz,
             phy.GRIDS[params.grid],
             centre_cycles=params.centre_hz / params.rate_hz if params.one_crystal else 0.0,
+            expected=self._expected(),
         )
         sense = phy.EnergyDetector(params.carrier_db) if self._listens else None
         receiving = self._receiving = SensingReceiver(receiver, sense, params.rate_hz)
@@ -176,6 +182,13 @@ class ModemHere:
             self._rx.stop()
         if self._tx is not None:
             self._tx.close()
+
+    def _expected(self) -> phy.Expected:
+        """What the headers of this link may tell, and how many others are followed a second."""
+        params, size = self._params, self._pdu_size
+        one = phy.layout(phy.GRIDS[params.grid], 0, 1, size).n_samples
+        longest = max(one, round(params.max_burst_s * params.rate_hz))
+        return phy.Expected(size, longest, every=round(params.rate_hz / MISSES_PER_S))
 
     def _first_index(self) -> int:
         """Index of the radio's first sample on the clock that began at `began_s`."""

@@ -8,6 +8,10 @@ from sdrlinkd.link import Sensed
 
 # The energy of a burst may seem to end later than its header says, by this many samples.
 TAIL = 2 * phy.SENSE_WINDOW
+# A burst whose SNR is this far above the threshold shows as energy in every window, ...
+CLEARLY_DB = 3.0
+# ... so after this many samples without energy, it is over, whatever its header said.
+VANISHED = 4 * phy.SENSE_WINDOW
 
 
 class SensingReceiver:
@@ -52,8 +56,12 @@ class SensingReceiver:
     def _sense_air(self, sense: "phy.EnergyDetector") -> Sensed:
         rate = self._rate_hz
         until, energy_end = sense.next_index, sense.busy_until
-        begin, end = self._receiver.last_burst
+        begin, end, snr_db = self._receiver.claim
         burst_at: float | None = begin / rate
+        if energy_end + VANISHED <= until and energy_end > begin + TAIL:
+            # False headers claim air that nobody uses.
+            shows = snr_db >= sense.threshold_db + CLEARLY_DB
+            end = min(end, energy_end) if shows else end
         if self._unheard_until > max(end, energy_end):
             return Sensed(until / rate, (self._unheard_until + 1) / rate)
         if energy_end > end + TAIL:
