@@ -3,6 +3,8 @@
 import struct
 from typing import NamedTuple
 
+from sdrlinkd.wire.repeat import PDU_NUMBER
+
 UNKNOWN_WALL = -(1 << 63)
 MAX_WALL_ERROR_US = 0xFFFF
 CLOCK_NUMBERS = 1 << 16
@@ -30,7 +32,8 @@ class Clock(NamedTuple):
 
     It is the sender's CLOCK `number`. The sender's CLOCK `stamped` left at `left_ns`; if none has
     left yet, `stamped` equals `number`. The time since 1970 of the sender's host is its own clock
-    plus `wall_ns`, ± `wall_error_us`; UNKNOWN_WALL: unknown.
+    plus `wall_ns`, ± `wall_error_us`; UNKNOWN_WALL: unknown. `pdu_number` is that of the PDU with
+    the record, None if it is not told.
     """
 
     boot_id: int
@@ -40,6 +43,7 @@ class Clock(NamedTuple):
     wall_ns: int = UNKNOWN_WALL
     wall_error_us: int = 0
     arrivals: tuple[Arrival, ...] = ()
+    pdu_number: int | None = None
 
 
 def tellable(arrival: Arrival) -> bool:
@@ -50,7 +54,9 @@ def tellable(arrival: Arrival) -> bool:
 def build_clock(clock: Clock) -> bytes:
     """The value of a CLOCK record. Raises struct.error if a field is out of range."""
     told = [_ARRIVAL.pack(node, n, round(ns / TICK_NS)) for node, n, ns in clock.arrivals]
-    return b"".join((_FIXED.pack(*clock[:-1]), *told))
+    if clock.pdu_number is not None:
+        told.append(PDU_NUMBER.pack(clock.pdu_number))
+    return b"".join((_FIXED.pack(*clock[:6]), *told))
 
 
 def parse_clock(value: bytes) -> Clock:
@@ -60,4 +66,7 @@ def parse_clock(value: bytes) -> Clock:
     arrivals = tuple(
         Arrival(node, number, TICK_NS * ticks) for node, number, ticks in _ARRIVAL.iter_unpack(told)
     )
-    return Clock._make((*_FIXED.unpack_from(value), arrivals))
+    # Arrivals have seven octets, so four that are left can only be the number.
+    rest = value[_FIXED.size + n * _ARRIVAL.size :]
+    pdu_number = PDU_NUMBER.unpack(rest)[0] if len(rest) == PDU_NUMBER.size else None
+    return Clock._make((*_FIXED.unpack_from(value), arrivals, pdu_number))

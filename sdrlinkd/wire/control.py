@@ -20,6 +20,17 @@ from sdrlinkd.wire.contact import (
 )
 from sdrlinkd.wire.declared import TopicPiece, build_topic, parse_topic
 from sdrlinkd.wire.registry import BROADCAST, RegistryDigest
+from sdrlinkd.wire.repeat import (
+    NEED_OVERHEAD,
+    PDU_NUMBER,
+    REPEAT_SIZE,
+    Need,
+    Repeat,
+    build_need,
+    build_repeat,
+    parse_need,
+    parse_repeat,
+)
 
 TLV_HEADER_SIZE = 2
 MAX_AGE_US = 0xFFFFFFFF
@@ -43,8 +54,10 @@ class RecordType(IntEnum):
     FRAME = 7
     CLOCK = 8
     WAITS = 9
+    NEED = 10
     TOPIC = 15
     WANTED = 17
+    REPEAT = 18
     CONTACT = 19
     KEY = 20
 
@@ -59,10 +72,14 @@ class Stamp(NamedTuple):
 
 
 class Beacon(NamedTuple):
-    """BEACON record: `boot_id` changes with every start, `number` counts up modulo 2^16."""
+    """BEACON record: `boot_id` changes with every start, `number` counts up modulo 2^16.
+
+    `pdu_number` is that of the PDU with the record, None if it is not told.
+    """
 
     boot_id: int
     number: int
+    pdu_number: int | None = None
 
 
 class LinkReport(NamedTuple):
@@ -147,7 +164,18 @@ class Parity(NamedTuple):
 
 
 FixedRecord = Stamp | Beacon | LinkReport | Receipt | Frame | Waits
-Record = FixedRecord | RegistryDigest | Parity | Clock | TopicPiece | Wanted | Contact | KeyTold
+Record = (
+    FixedRecord
+    | RegistryDigest
+    | Parity
+    | Clock
+    | TopicPiece
+    | Wanted
+    | Contact
+    | KeyTold
+    | Need
+    | Repeat
+)
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
     Stamp: RecordType.STAMP,
@@ -189,6 +217,8 @@ _LEAST = {
     int(RecordType.WANTED): WANTED_OVERHEAD - TLV_HEADER_SIZE,
     int(RecordType.CONTACT): CONTACT_NUMBER_SIZE,
     int(RecordType.KEY): KEY_SIZE,
+    int(RecordType.NEED): NEED_OVERHEAD - TLV_HEADER_SIZE + 1,
+    int(RecordType.REPEAT): REPEAT_SIZE - TLV_HEADER_SIZE,
 }
 
 
@@ -202,6 +232,8 @@ _READERS: dict[int, Callable[[bytes], Record]] = {
     RecordType.WANTED: lambda value: Wanted(value[0], bytes(value[1:])),
     RecordType.CONTACT: parse_contact,
     RecordType.KEY: parse_key,
+    RecordType.NEED: parse_need,
+    RecordType.REPEAT: parse_repeat,
 }
 """Readers of the values of records without fixed fields, by type number."""
 
@@ -262,6 +294,9 @@ def _fixed(number: RecordType, record: FixedRecord) -> bytes:
     fields = _FORMATS[number]
     if isinstance(record, Stamp):
         return fields.pack(*record[:3]) + ASKS * record.asks
+    if isinstance(record, Beacon):
+        told = record.pdu_number
+        return fields.pack(*record[:2]) + (b"" if told is None else PDU_NUMBER.pack(told))
     if isinstance(record, Receipt):
         is_whole = record[3:] != (BROADCAST, NO_AGE, 0)
         return fields.pack(*record[:3]) + (_WHOSE.pack(*record[3:]) if is_whole else b"")
@@ -277,6 +312,8 @@ _BUILDERS: dict[type[Record], tuple[RecordType, Callable[[Any], bytes]]] = {
     Wanted: (RecordType.WANTED, lambda record: bytes((record.node,)) + record.topics),
     Contact: (RecordType.CONTACT, build_contact),
     KeyTold: (RecordType.KEY, build_key),
+    Need: (RecordType.NEED, build_need),
+    Repeat: (RecordType.REPEAT, build_repeat),
 }
 
 
@@ -295,6 +332,8 @@ def _with_more(record: FixedRecord, more: bytes) -> FixedRecord:
     """The record with the optional fields in `more`; unknown fields are ignored."""
     if isinstance(record, Stamp):
         return record._replace(asks=bool(more[0] & ASKS[0]))
+    if isinstance(record, Beacon) and len(more) >= PDU_NUMBER.size:
+        return record._replace(pdu_number=PDU_NUMBER.unpack_from(more)[0])
     if isinstance(record, Receipt) and len(more) >= _WHOSE.size:
         return Receipt(*record[:3], *_WHOSE.unpack_from(more))
     return record

@@ -17,6 +17,7 @@ from sdrlinkd.wire.control import (
 from sdrlinkd.wire.crc import crc16
 from sdrlinkd.wire.pdu import identity
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
+from sdrlinkd.wire.repeat import HELD_AT
 
 # Offset in a record's value of the time that counts up to the burst's preamble.
 _AGE, _PHASE = 2, 4
@@ -25,9 +26,10 @@ _POSTPONED = {int(RecordType.STAMP): _AGE, int(RecordType.FRAME): _PHASE}
 _FORWARDED = {int(RecordType.STAMP): _AGE}
 _STARTS = {int(RecordType.FRAME), int(RecordType.CLOCK)}
 _U32 = struct.Struct(">I")
-# The time in a RECEIPT has a smaller field, and may be absent.
-_SINCE, _SINCE_END = 6, 8
 _U16 = struct.Struct(">H")
+# Times in smaller fields, in units of 0.1 ms. That of a RECEIPT may be absent.
+_SINCE, _SHORT_UNIT_US = 6, RECEIPT_UNIT_US
+_SHORT_POSTPONED = {int(RecordType.RECEIPT): _SINCE, int(RecordType.REPEAT): HELD_AT}
 _SEQ, HOP = 3, 4
 """Index of the octet with the hops left and the number of entries."""
 
@@ -36,7 +38,7 @@ def postponed(pdu: bytes, by_us: int) -> bytes:
     """A PDU of our own, with control channel, adjusted for a burst that leaves `by_us` µs later."""
     data = bytearray(pdu)
     _move(data, by_us, _POSTPONED)
-    _later_receipts(data, by_us)
+    _move_short(data, by_us, _SHORT_POSTPONED)
     return _with_crc(data)
 
 
@@ -44,7 +46,7 @@ def aged(pdu: bytes, by_us: int) -> bytes:
     """An inner PDU, whose times grow by the `by_us` µs for which its sealed PDU was delayed."""
     data = bytearray(pdu)
     _move(data, by_us, _FORWARDED)
-    _later_receipts(data, by_us)
+    _move_short(data, by_us, _SHORT_POSTPONED)
     return _with_crc(data)
 
 
@@ -118,11 +120,13 @@ def _move(data: bytearray, by_us: int, kinds: dict[int, int]) -> None:
         _U32.pack_into(data, at, min(told + by_us, MAX_AGE_US))
 
 
-def _later_receipts(data: bytearray, by_us: int) -> None:
+def _move_short(data: bytearray, by_us: int, kinds: dict[int, int]) -> None:
     for kind, at, length in _records(data):
-        if kind == RecordType.RECEIPT and length >= _SINCE_END:
-            (since,) = _U16.unpack_from(data, at + _SINCE)
-            _U16.pack_into(data, at + _SINCE, min(since + by_us // RECEIPT_UNIT_US, MAX_SINCE))
+        offset = kinds.get(kind)
+        if offset is not None and length >= offset + _U16.size:
+            (told,) = _U16.unpack_from(data, at + offset)
+            later = told + by_us // _SHORT_UNIT_US
+            _U16.pack_into(data, at + offset, min(later, MAX_SINCE))
 
 
 def _with_crc(data: bytearray) -> bytes:

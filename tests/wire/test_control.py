@@ -19,8 +19,10 @@ from sdrlinkd.wire import (
     KeyTold,
     LinkReport,
     Met,
+    Need,
     Parity,
     Receipt,
+    Repeat,
     RegistryDigest,
     Stamp,
     TopicPiece,
@@ -36,12 +38,15 @@ SEED = 6
 CASES = 20_000
 
 # Number of octets that the fields of each type need (clause 6).
-NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8, 8: 24, 9: 4, 15: 4, 17: 1, 19: 8, 20: 5}
+NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8, 8: 24, 9: 4, 10: 6, 15: 4, 17: 1, 18: 8, 19: 8, 20: 5}
 # Types whose records may be longer than their fields.
-OPEN = (RegistryDigest, Parity, Clock, Stamp, Receipt, TopicPiece, Wanted, Contact, KeyTold)
+OPEN = (
+    RegistryDigest, Parity, Clock, Stamp, Receipt, TopicPiece, Wanted, Contact, KeyTold, Beacon, Need
+)  # fmt: skip
 
 octet = st.integers(0, 255)
 u16 = st.integers(0, 0xFFFF)
+u32 = st.integers(0, (1 << 32) - 1)
 i31 = st.integers(-(1 << 31) + 1, (1 << 31) - 1)
 records = st.one_of(
     st.builds(Stamp, octet, octet, st.integers(0, MAX_AGE_US), st.booleans()),
@@ -68,10 +73,13 @@ records = st.one_of(
         u16,
         st.lists(
             st.builds(Arrival, octet, u16, i31.map(lambda ticks: 10 * ticks)),
-            max_size=MAX_ARRIVALS,
+            max_size=MAX_ARRIVALS - 1,
         ).map(tuple),
+        st.none() | u32,
     ),
-    st.builds(Beacon, st.integers(0, 0xFFFF), st.integers(0, 0xFFFF)),
+    st.builds(Beacon, u16, u16, st.none() | u32),
+    st.builds(Need, octet, u32, st.binary(min_size=1, max_size=16)),
+    st.builds(Repeat, octet, u32, u16, octet),
     st.builds(LinkReport, octet, st.integers(-128, 127), octet, octet),
     st.tuples(octet, octet, octet).map(lambda fields: Receipt(*fields)),
     st.builds(Receipt, octet, octet, octet, octet, u16, u16),
@@ -110,7 +118,7 @@ def test_unknown_types_are_skipped(pairs, last):
     assert parse_records(payload) == [record for _, record in pairs]
 
 
-@pytest.mark.parametrize("kind", [0, 10, 11, 255])
+@pytest.mark.parametrize("kind", [0, 11, 12, 255])
 def test_reserved_types_are_skipped(kind):
     assert parse_records(bytes([kind, 2, 1, 6, 5, 3, 1, 2, 3])) == [Receipt(1, 2, 3)]
 
@@ -127,7 +135,7 @@ def test_longer_known_records_are_accepted(record, more, rest):
     assert parse_records(bytes(payload) + build_records(rest)) == [record, *rest]
 
 
-def test_octets_behind_the_fields_of_stamp_receipt_and_clock():
+def test_octets_behind_the_fields_of_stamp_receipt_clock_and_beacon():
     stamp, receipt = bytes([1, 2, 0, 0, 0, 3]), bytes([1, 2, 3])
     clock = build_records([Clock(1, 2, 3, 4)])[2:]
 
@@ -141,7 +149,15 @@ def test_octets_behind_the_fields_of_stamp_receipt_and_clock():
     assert parsed(5, whole + b"\x09") == [Receipt(1, 2, 3, 4, 0x0506, 0x0708)]
     assert parsed(8, clock + bytes(6)) == [Clock(1, 2, 3, 4)]
     told = b"\x07\x00\x08\xff\xff\xff\xfe"
-    assert parsed(8, clock + told + bytes(6)) == [Clock(1, 2, 3, 4, arrivals=(Arrival(7, 8, -20),))]
+    arrivals = (Arrival(7, 8, -20),)
+    assert parsed(8, clock + told + bytes(6)) == [Clock(1, 2, 3, 4, arrivals=arrivals)]
+    number = b"\x01\x02\x03\x04"
+    assert parsed(8, clock + number) == [Clock(1, 2, 3, 4, pdu_number=0x01020304)]
+    numbered = Clock(1, 2, 3, 4, arrivals=arrivals, pdu_number=0x01020304)
+    assert parsed(8, clock + told + number) == [numbered]
+    assert parsed(2, bytes(4) + number[:3]) == [Beacon(0, 0)]
+    assert parsed(2, bytes(4) + number + b"\xff") == [Beacon(0, 0, 0x01020304)]
+    assert parsed(10, bytes(6) + bytes(20)) == [Need(0, 0, bytes(16))]
 
 
 @pytest.mark.parametrize(
@@ -152,7 +168,7 @@ def test_short_known_record(kind, size):
     refused(bytes([kind, size]) + bytes(size) + bytes([200, 10]) + bytes(10))
 
 
-@pytest.mark.parametrize("kind", [*NEED, 10, 200])
+@pytest.mark.parametrize("kind", [*NEED, 11, 200])
 def test_record_that_overruns(kind):
     need = NEED.get(kind, 3)
     refused(bytes([kind]))
@@ -217,6 +233,13 @@ def test_any_bytes_are_records_or_refused():
         Stamp(0, 0, MAX_AGE_US + 1),
         Beacon(65536, 0),
         Beacon(0, 65536),
+        Beacon(0, 0, 1 << 32),
+        Need(256, 0, bytes(1)),
+        Need(0, 1 << 32, bytes(1)),
+        Need(0, 0, b""),
+        Need(0, 0, bytes(17)),
+        Repeat(0, 0, 65536, 0),
+        Repeat(0, 0, 0, 256),
         LinkReport(256, 0, 0, 0),
         LinkReport(0, -129, 0, 0),
         LinkReport(0, 128, 0, 0),

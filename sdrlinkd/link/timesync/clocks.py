@@ -86,7 +86,8 @@ class Clocks:
             if start - peer.last_at < FORGOTTEN_S
         ]
         arrivals = [each for each in told if each is not None and tellable(each)]
-        most = min(max(room, 0), MAX_ARRIVALS)
+        # The PDU number takes the place of one more.
+        most = min(max(room, 0), MAX_ARRIVALS - 1)
         if len(arrivals) > most:
             # Rotate, so that each robot gets the arrivals of its own CLOCKs.
             first = self._number * most % len(arrivals)

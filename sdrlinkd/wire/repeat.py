@@ -1,0 +1,100 @@
+"""PDU numbers, and the records NEED and REPEAT (wire document, 3.2, 6.13 and 6.14)."""
+
+import struct
+from collections.abc import Iterable
+from typing import NamedTuple
+
+PDU_NUMBERS = 1 << 32
+"""Count of PDU numbers, which wrap around."""
+PDU_NUMBER = struct.Struct(">I")
+MAX_BITMAP = 16
+"""Most octets of the bitmap in a NEED record."""
+REPEAT_UNIT_S = 1e-4
+MAX_HELD_REPEAT = 0xFFFF
+_NEED = struct.Struct(">BI")
+NEED_OVERHEAD = 2 + _NEED.size
+"""Octets of a NEED record without its bitmap."""
+_REPEAT = struct.Struct(">BIHB")
+REPEAT_SIZE = 2 + _REPEAT.size
+"""Octets of a REPEAT record."""
+HELD_AT = 5
+"""Offset of the time in the value of a REPEAT record."""
+
+
+class Need(NamedTuple):
+    """NEED record: the sender lacks PDUs of robot `node`.
+
+    Bit 7 of the first octet of `bitmap` stands for PDU `number`, and each further bit for the next.
+    """
+
+    node: int
+    number: int
+    bitmap: bytes
+
+    def numbers(self) -> list[int]:
+        """The numbers of the PDUs that are missing."""
+        bits = int.from_bytes(self.bitmap, "big")
+        last = 8 * len(self.bitmap) - 1
+        return [(self.number + i) % PDU_NUMBERS for i in range(last + 1) if bits >> (last - i) & 1]
+
+
+class Repeat(NamedTuple):
+    """REPEAT record: `n_pdus` PDUs of robot `node` from `number` on follow in this burst.
+
+    They were sent first `held_100us` units of 0.1 ms before.
+    """
+
+    node: int
+    number: int
+    held_100us: int
+    n_pdus: int
+
+
+def needs(node: int, missing: Iterable[int]) -> list[Need]:
+    """NEED records for the PDUs `missing`, in ascending order, of robot `node`."""
+    found: list[Need] = []
+    first, bits, last = 0, 0, -1
+    for number in missing:
+        if last >= 0 and number - first < 8 * MAX_BITMAP:
+            bits = bits << (number - last) | 1
+        else:
+            if last >= 0:
+                found.append(_need(node, first, bits, last - first + 1))
+            first, bits = number, 1
+        last = number
+    if last >= 0:
+        found.append(_need(node, first, bits, last - first + 1))
+    return found
+
+
+def _need(node: int, first: int, bits: int, n_bits: int) -> Need:
+    size = -(-n_bits // 8)
+    return Need(node, first % PDU_NUMBERS, (bits << (8 * size - n_bits)).to_bytes(size, "big"))
+
+
+def nearest_number(known: int, seq: int) -> int:
+    """The number with lowest octet `seq` that is nearest to `known`; it may be negative."""
+    return known + ((seq - known + 128) & 0xFF) - 128
+
+
+def build_need(need: Need) -> bytes:
+    """The value of a NEED record. Raises ValueError or struct.error if a field is out of range."""
+    if not 1 <= len(need.bitmap) <= MAX_BITMAP:
+        raise ValueError(f"{need} does not fit its record")
+    return _NEED.pack(need.node, need.number) + need.bitmap
+
+
+def parse_need(value: bytes) -> Need:
+    """The fields of a NEED value of sufficient length; what follows 16 octets is ignored."""
+    node, number = _NEED.unpack_from(value)
+    return Need(node, number, bytes(value[_NEED.size : _NEED.size + MAX_BITMAP]))
+
+
+def build_repeat(repeat: Repeat) -> bytes:
+    """The value of a REPEAT record. Raises struct.error if a field is out of range."""
+    return _REPEAT.pack(*repeat)
+
+
+def parse_repeat(value: bytes) -> Repeat:
+    """The fields of a REPEAT value of sufficient length."""
+    return Repeat(*_REPEAT.unpack_from(value))
