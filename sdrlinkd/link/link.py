@@ -503,8 +503,8 @@ class Link:
             self._scheduler.record_heard(src, record, at)
 
     def _forward(self, event: PduToRelay) -> None:
-        pdu, data, at, until, is_ours_too = event
-        refused = self._intake.forward(pdu, data, at, until, self._scheduler.bytes_per_s)
+        pdu, data, at, until, is_ours_too, number = event
+        refused = self._intake.forward(pdu, data, at, until, number, self._scheduler.bytes_per_s)
         if refused and not is_ours_too:
             self._reception.relay_refused()
         self._scheduler.more_to_send()

@@ -22,7 +22,7 @@ class ClearOpener:
     def set_uncertainty(self, stamp_s: float) -> None:
         """Nothing depends on the times of bursts."""
 
-    def open(self, data: bytes, at: float) -> Opened:
+    def open(self, data: bytes, at: float, later_s: float = 0.0) -> Opened:  # noqa: ARG002  # as in Opener
         """Note a sealed PDU, which never opens. Raises PduError with the ledger's reason."""
         pdu = parse_sealed(data, self._pdu_size)
         self.strangers.closed(pdu.src, pdu.kid, at)

@@ -87,8 +87,11 @@ class Opener:
         """Set the largest error of the times at which bursts come, in s."""
         self._limit_s = max(self._params.late_s, UNCERTAIN * stamp_s)
 
-    def open(self, data: bytes, at: float) -> Opened:
-        """Open a sealed PDU whose burst came at `at`. Raises PduError with the ledger's reason."""
+    def open(self, data: bytes, at: float, later_s: float = 0.0) -> Opened:
+        """Open a sealed PDU whose burst came at `at`. Raises PduError with the ledger's reason.
+
+        `later_s`: the time for which its source says that it has been on its way, as it repeats it.
+        """
         pdu = parse_sealed(data, self._pdu_size)
         _, src, dst, seq, kid, ticks, held = pdu
         ciphers = self._keys.by_kid.get(kid)
@@ -106,7 +109,7 @@ class Opener:
             raise self._closed("sec_bad_tag", src, dst, kid, at)
         inner, is_own = pdu.inner(text), src == self._own_id
         lead_s = at - ticks / TICKS_PER_S
-        held_s = held * HELD_UNIT_S
+        held_s = held * HELD_UNIT_S + later_s
         if peer.note(lead_s, at, kid, self._limit_s):
             # Our proof may have lapsed there, too.
             self._contacts.met_somebody(at)
@@ -128,7 +131,7 @@ class Opener:
             raise PduError("sec_late", f"held {held_s:g} s, robot {src}")
         window.take(ticks, seq)
         peer.heard_at = at
-        if held:
+        if held_s:
             inner = _aged(inner, held_s)
         return _make(Opened, (inner, src, ticks, lead_s, held_s, is_proven))
 

@@ -25,6 +25,8 @@ class EntryIds:
         self.resting: deque[tuple[float, int]] = deque()
         """Resting ids as (time when free, id), in order of that time."""
         self._rest_s = rest_s
+        self.taken = [0] * 256
+        """How often each id was taken."""
 
     def wake(self, now: float) -> None:
         """Free the ids that have rested for long enough at `now`."""
@@ -42,6 +44,17 @@ class EntryIds:
                 del self.resting[i]
                 return True
         return False
+
+    def rest_again(self, entry_id: int, taken: int, now: float) -> bool:
+        """Let an id rest anew from `now` on; False if it was taken more than `taken` times."""
+        if self.taken[entry_id] != taken:
+            return False
+        if self.hold(entry_id):
+            self.rest(entry_id, now)
+        elif entry_id in self.idle:
+            self.idle.remove(entry_id)
+            self.rest(entry_id, now)
+        return True
 
     def next_free(self) -> float:
         """Time at which an id will be free; −inf: now; +inf: not before an id starts to rest."""
@@ -66,7 +79,9 @@ class TopicEntryIds:
         if ids.resting:
             ids.wake(now)
         if ids.idle:
-            return ids.idle.popleft()
+            entry_id = ids.idle.popleft()
+            ids.taken[entry_id] += 1
+            return entry_id
         self.starved[message.topic_id] += 1
         return None
 
@@ -77,6 +92,19 @@ class TopicEntryIds:
             ids.rest(message.entry_id, now)
         else:
             ids.idle.append(message.entry_id)
+
+    def times_taken(self, channel: int, entry_id: int) -> int:
+        """How often an entry id of a topic was taken so far."""
+        ids = self._by_topic.get(channel)
+        return 0 if ids is None else ids.taken[entry_id]
+
+    def rest_again(self, channel: int, entry_id: int, taken: int, start: float) -> bool:
+        """Let an entry id rest anew, as a fragment under it is repeated at `start`.
+
+        False if the id was taken again since it was taken `taken` times.
+        """
+        ids = self._by_topic.get(channel)
+        return ids is not None and ids.rest_again(entry_id, taken, start)
 
     def not_left(self, messages: Iterable[Outgoing]) -> None:
         """Hold the ids of `messages`, whose fragments leave later than planned."""

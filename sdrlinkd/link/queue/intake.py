@@ -107,11 +107,12 @@ class Intake:
         self._enqueue(topic_id, payload, at, now, overrides._replace(dst=dst), bytes_per_s)
 
     def forward(
-        self, pdu: Pdu, data: bytes, at: float, until: float, bytes_per_s: float
-    ) -> str | None:
+        self, pdu: Pdu, data: bytes, at: float, until: float, number: int | None,
+        bytes_per_s: float,
+    ) -> str | None:  # fmt: skip
         """Queue another robot's PDU, which arrived at `at` and is worthless after `until`.
 
-        It gets the highest priority of its topics. Returns None, or the ledger's reason for
+        `number` is its PDU number, None if unknown. It gets the highest priority of its topics. Returns None, or the ledger's reason for
         refusing it.
         """
         tally = self._relayed
@@ -119,7 +120,7 @@ class Intake:
         priority = max((self._priority(each.topic_id) for each in pdu.entries), default=0)
         message = Outgoing(
             RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally,
-            is_whole=True,
+            is_whole=True, pdu_number=number,
         )  # fmt: skip
         return self._outbox.put(message, DEFAULT_POLICY, bytes_per_s)
 

@@ -19,6 +19,7 @@ from sdrlinkd.link.receive.events import (
     Event,
     Newcomer,
     PduHeard,
+    PduPlaced,
     PduToRelay,
     RecordHeard,
 )
@@ -45,6 +46,7 @@ __all__ = [
     "Newcomer",
     "Parts",
     "PduHeard",
+    "PduPlaced",
     "PduToRelay",
     "Reception",
     "RecordHeard",

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.neighbors import Neighbors
+from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import RxLedger
 from sdrlinkd.sealing import InTheClear, Opened, Sealing
 from sdrlinkd.wire import is_sealed
@@ -13,6 +14,8 @@ from sdrlinkd.wire import is_sealed
 WAIT_S = 2.0
 """Time in s for which PDUs wait for the proof of their source, and for which a schedule of a robot
 that is not proven is followed."""
+SEQ = 3
+"""Index of the octet with the sequence number."""
 MOST_WAITING = 512
 """Most PDUs of one source that wait."""
 
@@ -40,14 +43,16 @@ class Admitted(NamedTuple):
     is_held: bool = False
     """Whether it was held on its way. Nobody vouches for that, nor for the hops left, so what
     depends on the burst's time does not count then."""
+    number: int | None = None
+    """The PDU number of one that its source repeats."""
+    first_at: float = 0.0
+    """When it came, or would have come when it was sent first. Inside a sealed PDU, ages account
+    for that."""
 
 
 class _Waiting(NamedTuple):
+    pdu: Admitted
     opened: Opened
-    raw: bytes
-    at: float
-    snr_db: float | None
-    ended_at: float
 
 
 class Door:
@@ -55,8 +60,9 @@ class Door:
 
     def __init__(
         self, sealing: Sealing | InTheClear, acceptance: Acceptance, ledger: RxLedger,
-        neighbors: Neighbors,
+        neighbors: Neighbors, repeated: RepeatedPdus,
     ) -> None:  # fmt: skip
+        self._repeated = repeated
         self._neighbors = neighbors
         self._sealing = sealing
         self._opener = sealing.opener
@@ -69,13 +75,18 @@ class Door:
         self, data: bytes, at: float, snr_db: float | None, now: float, ended_at: float
     ) -> list[Admitted]:
         """The PDUs that may be taken now that `data` has come."""
+        number, first_at = self._first(data, at)
+        is_repeated = number is not None
+        pdu = Admitted(
+            data, data, at, snr_db, ended_at, is_held=is_repeated, number=number, first_at=first_at
+        )
         if not is_sealed(data):
             if self._opener.refuses_clear(data, now):
                 self._refuse("sec_cleartext")
                 return []
-            return [Admitted(data, data, at, snr_db, ended_at)]
+            return [pdu]
         try:
-            opened = self._opener.open(data, at)
+            opened = self._opener.open(data, at, at - first_at)
         except PduError as error:
             self._refuse(error.reason)
             neighbor = self._neighbors.get(data[1]) if error.reason == "rx_dup" else None
@@ -83,28 +94,25 @@ class Door:
                 neighbor.count_duplicate()
             return []
         src = opened.src
-        is_held = opened.held_s > 0
-        pdu = Admitted(
-            opened.inner, data, at, snr_db, ended_at, ticks=opened.ticks, is_held=is_held
-        )
+        pdu = pdu._replace(data=opened.inner, ticks=opened.ticks, is_held=opened.held_s > 0)
         if opened.is_proven:
             self._schedules_until.pop(src, None)
             return [*self._release(src, now), pdu] if src in self._waiting else [pdu]
-        pdu = pdu._replace(is_proven=False, may_schedule=self._may_schedule(src, now))
+        unproven = pdu._replace(is_proven=False, may_schedule=self._may_schedule(src, now))
         if self._opener.delivers_unproven or self._acceptance.delivers_unproven:
-            return [pdu]
+            return [unproven]
         waiting = self._waiting.setdefault(src, deque())
-        waiting.append(_Waiting(opened, data, at, snr_db, ended_at))
+        waiting.append(_Waiting(pdu, opened))
         if len(waiting) > MOST_WAITING:
             waiting.popleft()
             self._refuse("sec_unproven")
-        return [pdu._replace(is_glance=True)]
+        return [unproven._replace(is_glance=True)]
 
     def expire(self, now: float) -> None:
         """Drop the PDUs whose sources have not proven to be alive in time."""
-        for src in [src for src, each in self._waiting.items() if now - each[0].at > WAIT_S]:
+        for src in [src for src, each in self._waiting.items() if now - each[0].pdu.at > WAIT_S]:
             waiting = self._waiting[src]
-            while waiting and now - waiting[0].at > WAIT_S:
+            while waiting and now - waiting[0].pdu.at > WAIT_S:
                 waiting.popleft()
                 self._refuse("sec_unproven")
             if not waiting:
@@ -113,25 +121,22 @@ class Door:
     def _release(self, src: int, now: float) -> list[Admitted]:
         """The PDUs of a source that is proven now, as far as they were not delayed."""
         released = []
-        for opened, raw, at, snr_db, ended_at in self._waiting.pop(src):
-            if now - at > WAIT_S:
+        for pdu, opened in self._waiting.pop(src):
+            if now - pdu.at > WAIT_S:
                 self._refuse("sec_unproven")
             elif self._opener.is_late(src, opened.lead_s, opened.held_s):
                 self._refuse("sec_late")
             else:
-                released.append(
-                    Admitted(
-                        opened.inner,
-                        raw,
-                        at,
-                        snr_db,
-                        ended_at,
-                        was_seen=True,
-                        ticks=opened.ticks,
-                        is_held=opened.held_s > 0,
-                    )
-                )
+                released.append(pdu._replace(was_seen=True))
         return released
+
+    def _first(self, data: bytes, at: float) -> tuple[int | None, float]:
+        """(number of a PDU that its source repeats, when it would have come at first)."""
+        if self._repeated and len(data) > SEQ:
+            repeated = self._repeated.find(data[1], data[SEQ], at)
+            if repeated is not None:
+                return repeated
+        return None, at
 
     def _may_schedule(self, src: int, now: float) -> bool:
         return now < self._schedules_until.setdefault(src, now + WAIT_S)

@@ -1,68 +1,187 @@
 """The duplicate filter, which also counts lost PDUs."""
 
+from collections import deque
+from math import inf
+
+from sdrlinkd.wire import PDU_NUMBERS, nearest_number
+
 WINDOW = 128
+KEEP_S = 1.0
+"""Time in s for which a PDU is known again; repeated ones come up to this late."""
+MOST_PER_S = 20_000
+"""More PDUs than any source sends in a second."""
 
 
 class SequenceTrack:
-    """The sequence numbers of one source: duplicates within the last 128 PDUs, and known losses.
+    """The PDUs of one source: duplicates, and known losses.
 
-    Two PDUs are the same if sequence number and CRC (with the hop nibble taken as zero) are equal.
-    Sequence numbers are modulo 256. A step of n, up to 127 ahead, means that n − 1 PDUs are lost.
-    An older number that was missing is a late arrival. Any other older number means that the sender
-    restarted, or was away for longer than the numbers can tell.
+    Two PDUs are the same if PDU number and CRC (with the hop nibble taken as zero) are equal. PDUs
+    bring only the lowest octet of their number. A step of n, up to 127 ahead, means that n − 1 PDUs
+    are lost, unless the source tells another number. An older number that was missing is a late
+    arrival. Any other older number means that the sender restarted, or was away for longer than an
+    octet can tell; the next number that it tells decides.
 
     A restarted sender may also continue with a number that looks like a step ahead. Only its boot
     id tells: `restart` takes back the largest step since `goes_on` last confirmed the old one.
     """
 
-    __slots__ = ("_crc", "_leap", "_newest", "_position", "lost", "restarts")
+    __slots__ = (
+        "_anchor", "_doubtful", "_heard", "_heard_at", "_leap", "_order", "_seen", "_settled",
+        "fills", "is_numbered", "newest", "number", "restarts", "skipped",
+    )  # fmt: skip
 
     def __init__(self) -> None:
-        self._newest = -1
-        # By sequence number: the CRC last heard, and its extended position.
-        self._crc = [-1] * 256
-        self._position = [-(WINDOW + 1)] * 256
+        self.newest = -1
+        """The highest number heard; its lowest octet is true, and all of it if `is_numbered`."""
+        self.is_numbered = False
+        """Whether the source has told a number."""
+        self.number = -1
+        """Number of the PDU heard last."""
+        self.skipped = 0
+        """How many numbers before it were skipped."""
+        self.fills = False
+        """Whether it was missing before."""
+        self.restarts = 0
+        # By number: what distinguishes the PDU from others with its sequence number, and when it
+        # came; in the order of arrival.
+        self._seen: dict[int, tuple[int, float]] = {}
+        self._order: deque[int] = deque()
+        self._heard_at = -inf
+        # Losses before `_anchor`, the first number of the present life; PDUs heard after it; and
+        # numbers after it of which it is not known whether they were ever used.
+        self._settled = 0
+        self._anchor = 0
+        self._heard = 0
+        self._doubtful = 0
         # The most losses that one step has shown since the source's boot id was last confirmed.
         self._leap = 0
-        self.lost = 0
-        self.restarts = 0
 
-    def heard(self, seq: int, crc: int) -> bool:
-        """Note a PDU; False if it is a duplicate."""
-        newest = self._newest
-        if newest < 0:
-            self._accept(seq, crc, 256 + seq)
+    @property
+    def lost(self) -> int:
+        """How many PDUs were lost so far."""
+        after = self.newest - self._anchor - self._heard - self._doubtful
+        return self._settled + max(0, after)
+
+    def heard(
+        self, seq: int, crc: int, at: float = 0.0, told: int | None = None, *,
+        is_sealed: bool = False,
+    ) -> bool:  # fmt: skip
+        """Note a PDU that came at `at`; False if it is a duplicate.
+
+        `told`: its PDU number, if that was told. In place of its CRC, a sealed PDU has its T, which
+        no other PDU with its sequence number has.
+        """
+        self.skipped, self.fills = 0, False
+        if self._order:
+            self._forget(at)
+            reach = inf if is_sealed else WINDOW if told is None else 0
+            if self._is_known(seq, crc, reach):
+                return False
+        if self.newest < 0:
+            self._begin(seq if told is None else told, crc, at, is_told=told is not None)
             return True
-        ahead = (seq - newest) & 0xFF
-        if self._crc[seq] == crc and newest - self._position[seq] < WINDOW:
-            return False
-        if 0 < ahead < WINDOW:
-            self.lost += ahead - 1
-            self._leap = max(self._leap, ahead - 1)
-            self._accept(seq, crc, newest + ahead)
+        ahead = (seq - self.newest) & 0xFF
+        number = self.newest + ahead - (0 if 0 < ahead < WINDOW else 256 if ahead else 0)
+        if told is not None:
+            number = self._aligned(number, told, at)
+        step = number - self.newest
+        if step > 0:
+            self.skipped = step - 1
+            if self._doubtful and told is not None:
+                # It is the life of before, so what was skipped is lost.
+                self._doubtful = 0
+                self.restarts -= 1
+            self._leap = max(self._leap, step - 1)
+            self.newest = number
+            self._heard += 1
+        elif number in self._seen:
+            if told is not None and self._seen[number][0] == crc:
+                return False
+            self._jump(seq, crc, at)
             return True
-        behind = newest - ((newest - seq) & 0xFF)
-        if self._position[seq] < behind:
-            self.lost = max(0, self.lost - 1)
-            self._crc[seq] = crc
-            self._position[seq] = behind
-            return True
-        self.restart(seq, crc)
+        else:
+            self.fills = True
+            self._heard += number > self._anchor
+        self._note(number, crc, at)
         return True
+
+    def before(self, number: int) -> float:
+        """When the last PDU before `number` came that is known, of the last 128; −inf: none is."""
+        for each in range(number - 1, number - WINDOW, -1):
+            if each in self._seen:
+                return self._seen[each][1]
+        return -inf
 
     def goes_on(self) -> None:
         """Note that the source has not restarted so far: all steps ahead were losses."""
         self._leap = 0
 
-    def restart(self, seq: int, crc: int) -> None:
+    def restart(self, seq: int, crc: int, at: float = 0.0, told: int | None = None) -> None:
         """Start over with a source that counts from a new number, and forget what was heard."""
-        self.restarts += 1
-        self.lost = max(0, self.lost - self._leap)
-        self._leap = 0
-        self._crc = [-1] * 256
-        self._accept(seq, crc, self._newest + 256 + ((seq - self._newest) & 0xFF))
+        self.restarts += not self._doubtful
+        self._settled = max(0, self.lost - self._leap)
+        self._begin(seq if told is None else told, crc, at, is_told=told is not None)
 
-    def _accept(self, seq: int, crc: int, position: int) -> None:
-        self._newest = position
-        self._crc[seq] = crc
-        self._position[seq] = position
+    def _begin(self, number: int, crc: int, at: float, *, is_told: bool) -> None:
+        self.newest = self._anchor = number
+        self.is_numbered = is_told
+        self._heard = self._doubtful = self._leap = 0
+        self._seen.clear()
+        self._order.clear()
+        self._note(number, crc, at)
+
+    def _jump(self, seq: int, crc: int, at: float) -> None:
+        """Go on with a number that is in use: the source restarted, or was away for long."""
+        ahead = (seq - self.newest) & 0xFF or 256
+        self.restarts += not self._doubtful
+        self._doubtful += ahead - 1
+        self.newest += ahead
+        self._heard += 1
+        self._note(self.newest, crc, at)
+
+    def _aligned(self, number: int, told: int, at: float) -> int:
+        """The number of a PDU, which is `number` by its sequence number and `told` by its source.
+
+        One that no source could have reached since its last PDU is not believed.
+        """
+        if not self.is_numbered:
+            self._shift(nearest_number(told, number & 0xFF) - number)
+            self.is_numbered = True
+            return nearest_number(told, number & 0xFF)
+        off = (told - self.newest + PDU_NUMBERS // 2) % PDU_NUMBERS - PDU_NUMBERS // 2
+        believed = self.newest + off
+        most = 256 + MOST_PER_S * (at - self._heard_at)
+        return believed if -MOST_PER_S * KEEP_S < off <= most else number
+
+    def _shift(self, by: int) -> None:
+        """Renumber everything, as the true number of a PDU is known."""
+        self.newest += by
+        self._anchor += by
+        self._seen = {number + by: each for number, each in self._seen.items()}
+        self._order = deque(number + by for number in self._order)
+
+    def _is_known(self, seq: int, crc: int, reach: float) -> bool:
+        """Whether the PDU was heard among the last `reach` ones.
+
+        Without T, a PDU with the same content may come every 256 PDUs.
+        """
+        number = self.newest - ((self.newest - seq) & 0xFF)
+        # Numbers come nearly in order, so what came first is nearly the lowest.
+        lowest = max(self._order[0] - WINDOW, self.newest - reach + 1)
+        while number >= lowest:
+            known = self._seen.get(number)
+            if known is not None and known[0] == crc:
+                return True
+            number -= 256
+        return False
+
+    def _note(self, number: int, crc: int, at: float) -> None:
+        self.number = number
+        self._heard_at = at
+        self._seen[number] = crc, at
+        self._order.append(number)
+
+    def _forget(self, at: float) -> None:
+        order, seen = self._order, self._seen
+        while len(order) > WINDOW and seen[order[0]][1] < at - KEEP_S:
+            del seen[order.popleft()]

@@ -1,9 +1,12 @@
 """Events that a received PDU causes in the link, besides complete messages."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from sdrlinkd.link.receive.delivered import Delivered
 from sdrlinkd.wire import Pdu, Record, Stamp
+
+if TYPE_CHECKING:
+    from sdrlinkd.link.receive.pdu_read import PduRead
 
 
 class PduHeard(NamedTuple):
@@ -47,10 +50,25 @@ class Ended(NamedTuple):
     at: float
 
 
+class PduPlaced(NamedTuple):
+    """A PDU that was not heard before, and its number among those of its source.
+
+    It came at `at`, and `n_skipped` numbers before it were skipped. `is_wanted`: it is for this
+    robot, or to be relayed.
+    """
+
+    read: "PduRead"
+    number: int
+    n_skipped: int
+    is_wanted: bool
+    at: float
+
+
 class PduToRelay(NamedTuple):
     """A PDU to be relayed; all its messages are worthless after `until`.
 
-    `is_ours_too`: the PDU is for this robot as well as for others.
+    Its ages are those at `at`. `is_ours_too`: the PDU is for this robot as well as for others.
+    `number` is its PDU number, None if unknown.
     """
 
     pdu: Pdu
@@ -58,6 +76,7 @@ class PduToRelay(NamedTuple):
     at: float
     until: float
     is_ours_too: bool
+    number: int | None = None
 
 
-Event = Delivered | PduHeard | RecordHeard | Newcomer | Ended | PduToRelay
+Event = Delivered | PduHeard | RecordHeard | Newcomer | Ended | PduPlaced | PduToRelay

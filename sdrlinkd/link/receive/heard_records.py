@@ -17,12 +17,13 @@ from sdrlinkd.wire import (
     Receipt,
     Record,
     RegistryDigest,
+    Repeat,
     Stamp,
     TopicPiece,
     Wanted,
 )
 
-_ELSEWHERE = (Parity, Stamp, Contact, KeyTold)
+_ELSEWHERE = (Parity, Stamp, Contact, KeyTold, Repeat)
 """Records that others take: the inbox, and sealing."""
 
 

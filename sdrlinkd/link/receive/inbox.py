@@ -10,17 +10,12 @@ from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.ages import Ages
 from sdrlinkd.link.receive.completion import Completion
 from sdrlinkd.link.receive.door import Admitted
-from sdrlinkd.link.receive.events import (
-    Ended,
-    Event,
-    Newcomer,
-    PduHeard,
-    PduToRelay,
-    RecordHeard,
-)
+from sdrlinkd.link.receive.events import Ended, Event, Newcomer, PduHeard, PduPlaced, PduToRelay
 from sdrlinkd.link.receive.heard_records import HeardRecords
 from sdrlinkd.link.receive.neighbors import Neighbor, Neighbors
+from sdrlinkd.link.receive.pdu_read import PduRead, PduReader
 from sdrlinkd.link.receive.relay import Relay
+from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import Held, RxLedger
 from sdrlinkd.link.receive.undeclared import Whole
 from sdrlinkd.link.topics import HeardTopics
@@ -29,26 +24,21 @@ from sdrlinkd.wire import (
     CONTROL_TOPIC_ID,
     PARTS,
     Beacon,
-    ControlEntries,
     Entry,
-    Frame,
     Parity,
     Pdu,
     Reassembly,
     ReassemblyLimits,
     Record,
     Registry,
-    Stamp,
+    Repeat,
     identity,
     lasting_identity,
-    numbered,
-    parse,
     parse_part,
-    read_control_entries,
-    with_topic,
 )
 
-_NO_CONTROL = ControlEntries([], 0, 0)
+OLDEST_S = 10.0
+"""Largest age in s that a PDU without a word on it may have."""
 
 
 class Inbox:
@@ -70,18 +60,19 @@ class Inbox:
         ledger: RxLedger,
         topics: HeardTopics,
         completion: Completion,
+        repeated: RepeatedPdus,
         clear_size: int,
     ) -> None:
-        self._pdu_size = params.pdu_size
-        self._clear_size = clear_size
-        self._hop_limit = params.hop_limit
+        self._reader = PduReader(
+            params, clear_size, has_control=registry.has_control, has_numbers=topics.has_numbers
+        )
+        self._repeated = repeated
         self._own_id = own_id
         self._hears_self = hears_self
         self._neighbors = neighbors
         self._relay = relay
         self._acceptance = acceptance
         self._has_control = registry.has_control
-        self._has_numbers = topics.has_numbers
         self._topics = topics
         self._completion = completion
         self._records = HeardRecords(own_id, topics, completion)
@@ -95,16 +86,16 @@ class Inbox:
     def hear(self, admitted: Admitted, now: float) -> list[Event]:
         """Take a PDU and return the events that follow from it."""
         if admitted.is_glance:
-            return self._glance(admitted)
+            return self._reader.glance(admitted)
         self._ledger.hear()
         events: list[Event] = []
-        data, at = admitted.data, admitted.at
+        at, first_at = admitted.at, admitted.first_at
         try:
-            read = self._read(admitted)
+            read = self._reader.read(admitted)
         except PduError as error:
             return self._drop(error.reason, events)
-        pdu, control, records, is_relayed = read
-        stamps = [record for record in records if isinstance(record, Stamp)]
+        pdu, control, _, is_relayed = read
+        stamps = read.stamps
         if not admitted.was_seen and (pdu.src != self._own_id or is_relayed):
             events.append(PduHeard(pdu, stamps, at, is_relayed))
         if pdu.src == self._own_id and not self._hears_self:
@@ -114,13 +105,17 @@ class Inbox:
             neighbor = self._neighbors.meet(pdu.src)
             self._announce(pdu.src, at, events)
         neighbor.heard_at(at)
-        _, seq, crc = lasting_identity(data) if stamps else identity(data)
-        if admitted.ticks is not None:
-            crc = admitted.ticks
-        if not neighbor.track.heard(seq, crc):
+        key = self._key(admitted, read)
+        track = neighbor.track
+        if not track.heard(*key[1:], at, admitted.number or read.told, is_sealed=key[0]):
             neighbor.count_duplicate()
             return self._drop("rx_dup", events)
-        neighbor.count_new(pdu.hop)
+        neighbor.count_new(pdu.hop, is_repaired=track.fills and admitted.number is not None)
+        if track.fills and not is_relayed:
+            # It may be a repeated PDU whose REPEAT was lost.
+            first_at = max(track.before(track.number), at - OLDEST_S)
+            read = self._reader.read(admitted, at - first_at)
+        records, stamps = read.records, read.stamps
         if control.n_bad:
             self._ledger.skip_records(control.n_bad)
         if not is_relayed:
@@ -128,16 +123,22 @@ class Inbox:
         for stamp in stamps:
             self._ages.stamp(pdu.src, stamp, at)
         is_ours = pdu.dst in (BROADCAST, self._own_id) or self._hears_self
-        if self._relay.wants(pdu) and admitted.is_proven:
+        is_relay = self._relay.wants(pdu) and admitted.is_proven
+        if track.is_numbered:
+            events.append(PduPlaced(read, track.number, track.skipped, is_ours or is_relay, at))
+        if is_relay:
             until = min(at + self._relay.lifespan_s, self._fresh_until(pdu))
-            events.append(PduToRelay(pdu, admitted.raw, at, until, is_ours))
+            number = track.number if track.is_numbered else None
+            events.append(PduToRelay(pdu, admitted.raw, first_at, until, is_ours, number))
             if not is_ours:
                 return self._drop("rx_relayed", events)
         if not is_ours:
             return self._drop("rx_not_for_us", events)
         for record in records:
             if isinstance(record, Beacon):
-                self._take_beacon(record, neighbor, seq, crc, at, now, events)
+                self._take_beacon(record, neighbor, read, key, at, now, events)
+            elif isinstance(record, Repeat) and not is_relayed and record.node == pdu.src:
+                self._ledger.skip_records(not self._repeated.take(record, at))
         self._records.take(pdu, admitted, neighbor, records, is_relayed, now, events)
         repaired = self._repaired(pdu.src, records, at) if records else []
         if self._reassembly.lost:
@@ -173,43 +174,24 @@ class Inbox:
         self._ages.expire(now, self._reassembly.holds)
         return events
 
-    def _read(self, admitted: Admitted) -> tuple[Pdu, ControlEntries, list[Record], bool]:
-        """(PDU, its control entries, its records, whether a relay sent it). Raises PduError."""
-        is_opened = admitted.ticks is not None
-        size = self._pdu_size if is_opened else self._clear_size
-        pdu = parse(admitted.data, size, is_intact=is_opened)
-        control = read_control_entries(pdu) if self._has_control else _NO_CONTROL
-        records = control.records
-        if self._has_numbers:
-            pdu, records = numbered(pdu), [with_topic(record) for record in records]
-        return pdu, control, records, pdu.hop < self._hop_limit or admitted.is_held
-
-    def _glance(self, admitted: Admitted) -> list[Event]:
-        """The events that follow from the presence of a PDU whose source is not proven."""
-        try:
-            pdu, _, records, is_relayed = self._read(admitted)
-        except PduError:
-            return []
-        events: list[Event] = [PduHeard(pdu, [], admitted.at, is_relayed)]
-        if not is_relayed:
-            events += [
-                RecordHeard(pdu.src, record, admitted.at)
-                for record in records
-                if isinstance(record, Beacon)
-                or (isinstance(record, Frame) and admitted.may_schedule)
-            ]
-        return events
-
     def _take_beacon(
-        self, beacon: Beacon, neighbor: Neighbor, seq: int, crc: int, at: float, now: float,
-        events: list[Event],
+        self, beacon: Beacon, neighbor: Neighbor, read: PduRead, key: tuple[bool, int, int],
+        at: float, now: float, events: list[Event],
     ) -> None:  # fmt: skip
         if not neighbor.take_beacon(beacon):
             neighbor.track.goes_on()
             return
-        neighbor.track.restart(seq, crc)
+        neighbor.track.restart(*key[1:], at, read.told)
         self._forget(neighbor.src, now, events)
         self._announce(neighbor.src, at, events)
+
+    @staticmethod
+    def _key(admitted: Admitted, read: PduRead) -> tuple[bool, int, int]:
+        """(whether T makes it unique, sequence number, T or CRC) of a PDU."""
+        data = admitted.data
+        if admitted.ticks is not None:
+            return True, data[3], admitted.ticks
+        return False, *(lasting_identity(data) if read.stamps else identity(data))[1:]
 
     def _drop(self, reason: str, events: list[Event]) -> list[Event]:
         self._ledger.drop_pdu(reason)

@@ -25,6 +25,7 @@ class Neighbor:
     track: SequenceTrack = field(default_factory=SequenceTrack)
     heard: int = 0
     duplicates: int = 0
+    repaired: int = 0
     last_heard_at: float = 0.0
     usual_gap_s: float = 0.0
     """Longest recent pause between its PDUs, in s."""
@@ -44,9 +45,10 @@ class Neighbor:
             self.usual_gap_s = max(gap_s, GAP_DECAY * self.usual_gap_s)
         self.last_heard_at = at
 
-    def count_new(self, hops_left: int) -> None:
-        """Count one PDU that was not heard before."""
+    def count_new(self, hops_left: int, *, is_repaired: bool = False) -> None:
+        """Count one PDU that was not heard before; `is_repaired`: it was lost, and repeated."""
         self.heard += 1
+        self.repaired += is_repaired
         self.hops_left = hops_left
 
     def count_duplicate(self) -> None:
@@ -62,12 +64,17 @@ class Neighbor:
             self.mean_snr_db += SNR_WEIGHT * (snr_db - self.mean_snr_db)
 
     def take_quality(self) -> tuple[float, float] | None:
-        """(mean SNR in dB, share of PDUs lost since the last call); None if nothing was heard."""
-        heard = self.heard - self._reported[0]
-        lost = max(0, self.track.lost - self._reported[1])
-        if not heard or self.mean_snr_db is None:
+        """(mean SNR in dB, share of PDUs lost since the last call); None if nothing was heard.
+
+        What was repeated counts as lost, too.
+        """
+        missed = self.track.lost + self.repaired
+        first_heard = self.heard - self.repaired
+        heard = first_heard - self._reported[0]
+        lost = max(0, missed - self._reported[1])
+        if heard <= 0 or self.mean_snr_db is None:
             return None
-        self._reported = (self.heard, self.track.lost)
+        self._reported = (first_heard, missed)
         return self.mean_snr_db, lost / (heard + lost)
 
     def take_beacon(self, beacon: Beacon) -> bool:

@@ -1,0 +1,52 @@
+"""When the PDUs that a source repeats were sent first, as its REPEAT records say."""
+
+from typing import NamedTuple
+
+from sdrlinkd.wire import PDU_NUMBERS, REPEAT_UNIT_S, Repeat
+
+LONGEST_HELD_S = 2.0
+"""Longest time in s between a PDU and its repetition that is believed."""
+MOST_PDUS = 63
+SAME_BURST_S = 5e-3
+"""Largest difference in s between the times of two PDUs of one burst; a radio tells no difference,
+datagrams come one after the other."""
+
+
+class Repeated(NamedTuple):
+    """A PDU `number` that was sent first at `first_at`, on our clock, and is repeated."""
+
+    number: int
+    first_at: float
+
+
+class RepeatedPdus:
+    """The PDUs that the last REPEAT records of each source announce."""
+
+    def __init__(self) -> None:
+        self._by_src: dict[int, tuple[float, dict[int, Repeated]]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._by_src)
+
+    def take(self, repeat: Repeat, at: float) -> bool:
+        """Take a REPEAT of its own source in a burst that came at `at`; False if it is nonsense."""
+        node, number, held, n_pdus = repeat
+        held_s = held * REPEAT_UNIT_S
+        if held_s > LONGEST_HELD_S or not 0 < n_pdus <= MOST_PDUS:
+            return False
+        burst_at, told = self._by_src.get(node, (at, {}))
+        if abs(at - burst_at) > SAME_BURST_S:
+            told = {}
+        for i in range(n_pdus):
+            each = (number + i) % PDU_NUMBERS
+            told[each & 0xFF] = Repeated(each, at - held_s)
+        self._by_src[node] = at, told
+        return True
+
+    def find(self, src: int, seq: int, at: float) -> Repeated | None:
+        """What was announced of a PDU in the burst that came at `at`; None if it is a new one."""
+        burst_at, told = self._by_src.get(src, (at, {}))
+        if not 0 <= at - burst_at <= SAME_BURST_S:
+            del self._by_src[src]
+            return None
+        return told.get(seq)

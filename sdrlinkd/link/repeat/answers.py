@@ -1,0 +1,246 @@
+"""The PDUs that others lack and that we can send again: which of them, and when."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from math import inf
+from typing import NamedTuple
+
+from sdrlinkd.link.packing import TopicEntryIds
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.queue import Outgoing
+from sdrlinkd.link.repeat.budget import Budget
+from sdrlinkd.link.repeat.kept import Kept, KeptPdus
+from sdrlinkd.link.repeat.params import RepeatParams
+from sdrlinkd.wire import BROADCAST, Need
+
+UNION_S = 0.01
+"""Time in s for which a PDU to everyone waits, so that one repetition serves all who ask."""
+TWICE_AFTER_S = 0.005
+"""Time in s after which a PDU is sent for the second time unasked."""
+SHORT_LIFE_S = 0.1
+"""Lifespan in s below which nobody can ask in time."""
+MOST_WAITING = 512
+"""Most PDUs that wait to be sent again."""
+FARTHEST_BEHIND = 100
+"""How far behind the newest one of its source a relayed PDU in the clear may be."""
+
+
+@dataclass(slots=True)
+class _Wanted:
+    kept: Kept
+    due_at: float
+    askers: set[int] = field(default_factory=set)
+    """Who asked; nobody if the PDU is sent twice unasked."""
+
+
+class RepeatGroup(NamedTuple):
+    """PDUs to be repeated in one burst: of one source, class and MCS."""
+
+    kept: list[Kept]
+    qos: Qos
+    mcs: int
+    is_relayed: bool
+
+
+class RepeatReport(NamedTuple):
+    """What was repeated so far; `unknown`: PDUs that were asked for and are not kept (any more)."""
+
+    pdus: int = 0
+    airtime_s: float = 0.0
+    asked: int = 0
+    unknown: int = 0
+    expired: int = 0
+    refused: int = 0
+    """PDUs asked for that waited behind too many others."""
+
+
+class Answers:
+    """Keeps what was sent, and chooses what is sent again.
+
+    `slower[mcs]` is the MCS with the same code rate and the next lower modulation, or `mcs` itself.
+    """
+
+    def __init__(
+        self, params: RepeatParams, own_id: int, entry_ids: TopicEntryIds, *,
+        has_control: bool, has_numbers: bool, is_sealed: bool, twice: Iterable[Qos] = (),
+    ) -> None:  # fmt: skip
+        self.is_on = has_control and params.share > 0
+        """Whether anything is repeated on request."""
+        self._own_id = own_id
+        self._is_sealed = is_sealed
+        self._twice = frozenset(twice) if has_control else frozenset()
+        self._kept = KeptPdus(entry_ids, has_numbers=has_numbers)
+        self._budget = Budget(max(params.share, 1e-6))
+        self._wanted: dict[tuple[int, int], _Wanted] = {}
+        self._repeated_until: dict[tuple[int, int], float] = {}
+        """Until when each PDU was on the air for the last time, as far as it was repeated."""
+        self._newest: Counter[int] = Counter()
+        """The highest number sent, by source."""
+        self._served_s: defaultdict[int, float] = defaultdict(float)
+        """Airtime spent for each robot that asked, in s."""
+        self._pdus = self._asked = self._unknown = self._expired = self._refused = 0
+        self._airtime_s = 0.0
+        self._slower: Sequence[int] = ()
+
+    def set_slower(self, slower: Sequence[int]) -> None:
+        """Set, by MCS, that with which its PDUs are repeated."""
+        self._slower = slower
+
+    def sent(
+        self, numbers: Sequence[int | None], pdus: Sequence[bytes], plain: Sequence[bytes],
+        carried: Sequence[Sequence[Outgoing]], classes: Sequence[Qos], mcs: int, start: float,
+    ) -> None:  # fmt: skip
+        """Keep the PDUs with messages of a burst that left at `start`."""
+        if not (self.is_on or self._twice):
+            return
+        self._kept.forget(start)
+        for number, octets, inner, messages, qos in zip(
+            numbers, pdus, plain or pdus, carried, classes, strict=True
+        ):
+            if number is None or not messages:
+                continue
+            kept = self._kept.keep(number, octets, inner or octets, mcs, qos, messages, start)
+            self._newest[kept.src] = max(self._newest[kept.src], number)
+            if qos in self._twice and any(_is_short_lived(each) for each in messages):
+                self._wanted[kept.src, number] = _Wanted(kept, start + TWICE_AFTER_S)
+
+    def needed(self, asker: int, need: Need, at: float, n_others: int) -> None:
+        """Take a question that came at `at`, from one of `n_others` robots that hear us."""
+        if not self.is_on:
+            return
+        for number in need.numbers():
+            self._asked += 1
+            kept = self._kept.find(need.node, number)
+            if kept is None or not kept.is_for(asker) or self._is_stale(kept):
+                self._unknown += 1
+                continue
+            if kept.expires_at() <= at:
+                self._expired += 1
+                continue
+            key = kept.src, number
+            if self._repeated_until.get(key, -inf) >= at:
+                # It is on its way.
+                continue
+            known = self._wanted.get(key)
+            if known is None:
+                if len(self._wanted) >= MOST_WAITING:
+                    self._refused += 1
+                    continue
+                for_all = kept.dst == BROADCAST and n_others > 1
+                known = self._wanted[key] = _Wanted(kept, at + UNION_S * for_all)
+            known.askers.add(asker)
+
+    def heard(self, src: int, number: int) -> None:
+        """Note that another robot has sent a PDU that we might repeat."""
+        self._wanted.pop((src, number), None)
+
+    def due_at(self, now: float) -> float:
+        """When the next PDU may be repeated; infinity: none waits."""
+        if not self._wanted:
+            return inf
+        twice_at = min((e.due_at for e in self._wanted.values() if not e.askers), default=inf)
+        asked_at = min((e.due_at for e in self._wanted.values() if e.askers), default=inf)
+        return min(twice_at, max(asked_at, self._budget.free_at(now)))
+
+    def due_class(self, start: float) -> Qos | None:
+        """The most urgent class of the PDUs that may be repeated at `start`; None: there are none.
+
+        What has expired by then is dropped.
+        """
+        due = self._due(start)
+        return min((each.kept.qos for each in due), default=None)
+
+    def group(self, start: float, most: int) -> RepeatGroup | None:
+        """Up to `most` PDUs to repeat in a burst at `start`: the most urgent ones first.
+
+        Among equals, the robot for which least was repeated comes first.
+        """
+        due = [each for each in self._due(start) if self._kept.renew_ids(each.kept, start)]
+        if not due:
+            return None
+
+        def rank(each: _Wanted) -> tuple[Qos, float, int]:
+            served_s = min((self._served_s[asker] for asker in each.askers), default=0.0)
+            return each.kept.qos, served_s, each.kept.number
+
+        due.sort(key=rank)
+        first = due[0].kept
+        like = [
+            each.kept
+            for each in due
+            if (each.kept.src, each.kept.qos, each.kept.mcs) == (first.src, first.qos, first.mcs)
+        ]
+        chosen = sorted(like[:most], key=lambda kept: kept.number)
+        mcs = self._slower[first.mcs] if first.mcs < len(self._slower) else first.mcs
+        return RepeatGroup(chosen, first.qos, mcs, first.src != self._own_id)
+
+    def took(self, group: RepeatGroup, start: float, airtime_s: float) -> None:
+        """Note that PDUs are in a burst of `airtime_s` at `start`."""
+        each_s = airtime_s / len(group.kept)
+        for kept in group.kept:
+            wanted = self._wanted.pop((kept.src, kept.number))
+            self._repeated_until[kept.src, kept.number] = start + airtime_s
+            if wanted.askers:
+                self._budget.spend(each_s, start)
+            for asker in wanted.askers:
+                self._served_s[asker] += each_s / len(wanted.askers)
+
+    def left(self, group: RepeatGroup, airtime_s: float) -> None:
+        """Note that a burst with repeated PDUs left."""
+        self._pdus += len(group.kept)
+        self._airtime_s += airtime_s
+        for kept in group.kept:
+            for message in kept.carried:
+                message.repeat()
+
+    def not_left(self, group: RepeatGroup, now: float) -> None:
+        """Note that a burst with repeated PDUs did not leave: they wait again."""
+        for kept in group.kept:
+            key = kept.src, kept.number
+            self._repeated_until.pop(key, None)
+            self._wanted.setdefault(key, _Wanted(kept, now, {kept.dst}))
+
+    def expire(self, now: float) -> None:
+        """Forget what is too old to be repeated."""
+        self._kept.forget(now)
+        if len(self._repeated_until) > MOST_WAITING:
+            self._repeated_until = {
+                key: until
+                for key, until in self._repeated_until.items()
+                if self._kept.find(*key) is not None
+            }
+
+    def restart(self) -> None:
+        """Go on with another clock; what was sent before is forgotten."""
+        self._kept.clear()
+        self._wanted.clear()
+        self._repeated_until.clear()
+        self._budget.restart()
+
+    def report(self) -> RepeatReport:
+        """What was repeated so far."""
+        return RepeatReport(
+            self._pdus, self._airtime_s, self._asked, self._unknown, self._expired, self._refused
+        )
+
+    def _due(self, start: float) -> list[_Wanted]:
+        is_free = self._budget.free_at(start) <= start
+        due = []
+        for key, each in list(self._wanted.items()):
+            if each.kept.expires_at() <= start:
+                self._expired += 1
+                del self._wanted[key]
+            elif each.due_at <= start and (is_free or not each.askers):
+                due.append(each)
+        return due
+
+    def _is_stale(self, kept: Kept) -> bool:
+        """Whether others could take a PDU for a new one."""
+        if not kept.is_relayed or self._is_sealed:
+            return False
+        return self._newest[kept.src] - kept.number > FARTHEST_BEHIND
+
+
+def _is_short_lived(message: Outgoing) -> bool:
+    return message.expires_at - message.arrived_at < SHORT_LIFE_S

@@ -1,0 +1,231 @@
+"""What this robot lacks of others, and when it asks for it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import inf
+from typing import NamedTuple
+
+from sdrlinkd.link.receive import PduPlaced
+from sdrlinkd.wire import CONTROL_TOPIC_ID, PARTS, PDU_NUMBERS, Need, Parity, needs
+
+PATIENCE_S = 0.005
+"""Time in s for which a PDU may still come out of order."""
+RELAYED_PATIENCE_S = 0.05
+"""The same where a relay may bring it."""
+ALONE_S = 0.05
+"""Time in s for which a question waits for spare room."""
+ASKS = 3
+"""How often a PDU is asked for."""
+FIRST_AGAIN_S = 0.08
+LEAST_AGAIN_S, MOST_AGAIN_S = 0.02, 0.3
+"""Limits of the time in s after which a PDU is asked for again."""
+WEIGHT = 0.125
+"""Weight of the newest answer in the mean time of answers."""
+KEEP_S = 1.0
+"""Time in s after which its source has forgotten a PDU."""
+MOST_MISSING = 512
+"""Most PDUs of one source that are asked for."""
+USEFUL, USEFUL_WEIGHT = 0.05, 0.02
+"""Share of PDUs with messages for us from which a question gets a PDU of its own."""
+
+Holds = Callable[[int, int, int], bool]
+
+
+@dataclass(slots=True)
+class _Missing:
+    since: float
+    next_at: float
+    inside: frozenset[tuple[int, int]]
+    """(topic, entry id) of messages with fragments on both sides of it."""
+    asks_left: int = ASKS
+    asked_at: float = -inf
+
+
+@dataclass(slots=True)
+class _Source:
+    missing: dict[int, _Missing] = field(default_factory=dict)
+    last: PduPlaced | None = None
+    has_parity: set[int] = field(default_factory=set)
+    """Topics whose messages have parity."""
+    useful: float = 0.0
+    """Share of its recent PDUs with messages for us."""
+    answer_s: float = FIRST_AGAIN_S / 2
+    """Mean time from a question to its answer."""
+    hears_relays: bool = False
+
+    @property
+    def again_s(self) -> float:
+        return min(max(2 * self.answer_s, LEAST_AGAIN_S), MOST_AGAIN_S)
+
+
+class AskingReport(NamedTuple):
+    """Questions so far: `asked` counts each PDU as often as it was asked for."""
+
+    asked: int = 0
+    given_up: int = 0
+
+
+class Asking:
+    """The PDUs that are missing, by source, and when to ask for them.
+
+    `holds(src, topic, entry id)`: whether fragments of a message are held that lacks others.
+    """
+
+    def __init__(self, own_id: int, holds: Holds, *, is_on: bool) -> None:
+        self._own_id = own_id
+        self._holds = holds
+        self._is_on = is_on
+        self._sources: dict[int, _Source] = {}
+        self.due_at = inf
+        """When to ask next."""
+        self._offered: list[tuple[int, list[int]]] = []
+        self._asked = self._given_up = 0
+
+    def placed(self, event: PduPlaced) -> None:
+        """Take a new PDU, which may show that others before it are missing."""
+        pdu = event.read.pdu
+        if not self._is_on or pdu.src == self._own_id:
+            return
+        source = self._sources.get(pdu.src)
+        if source is None:
+            source = self._sources[pdu.src] = _Source()
+        if source.missing:
+            self._filled(source, event)
+        is_useful = event.is_wanted and event.read.control.n_entries < len(pdu.entries)
+        source.useful += USEFUL_WEIGHT * (is_useful - source.useful)
+        source.hears_relays = source.hears_relays or event.read.is_relayed
+        for record in event.read.records:
+            if isinstance(record, Parity):
+                source.has_parity.add(record.topic_id)
+        before = source.last
+        if before is not None and event.number < before.number:
+            return
+        source.last = event
+        if event.n_skipped and before is not None and (event.is_wanted or before.is_wanted):
+            self._skipped(source, before, event)
+
+    def others_need(self, need: Need, at: float) -> None:
+        """Take the question of another robot: what we lack, too, need not be asked for again."""
+        source = self._sources.get(need.node)
+        if source is None or not source.missing:
+            return
+        for number in need.numbers():
+            missing = source.missing.get(number)
+            if missing is not None and missing.asked_at < at:
+                self._count(source, number, missing, at)
+        self._look_ahead()
+
+    def questions(self, now: float) -> list[Need]:
+        """What to ask at `now`, if there is room."""
+        self._offered = []
+        found: list[Need] = []
+        for src, source in self._sources.items():
+            if not source.missing:
+                continue
+            self._drop_needless(src, source, now)
+            due = sorted(
+                number
+                for number, each in source.missing.items()
+                if each.next_at <= now and not self._awaits_parity(src, source, each)
+            )
+            if due:
+                self._offered.append((src, due))
+                found += needs(src, due)
+        self._look_ahead()
+        return found
+
+    def alone_at(self) -> float:
+        """From when the questions just returned have a PDU of their own; infinity: never."""
+        waited = [
+            min(self._sources[src].missing[number].next_at for number in numbers)
+            for src, numbers in self._offered
+            if self._sources[src].useful > USEFUL
+        ]
+        return min(waited, default=inf) + ALONE_S
+
+    def asked(self, start: float) -> None:
+        """Note that the questions returned last are in a burst at `start`."""
+        for src, numbers in self._offered:
+            source = self._sources[src]
+            for number in numbers:
+                missing = source.missing.get(number)
+                if missing is not None:
+                    self._asked += 1
+                    self._count(source, number, missing, start)
+        self._offered = []
+        self._look_ahead()
+
+    def forget(self, src: int) -> None:
+        """Forget what was missing of a robot that has restarted."""
+        self._sources.pop(src, None)
+        self._offered = [each for each in self._offered if each[0] != src]
+        self._look_ahead()
+
+    def report(self) -> AskingReport:
+        """Counts of questions so far."""
+        return AskingReport(self._asked, self._given_up)
+
+    def _filled(self, source: _Source, event: PduPlaced) -> None:
+        missing = source.missing.pop(event.number % PDU_NUMBERS, None)
+        if missing is not None:
+            if missing.asked_at > -inf and missing.asks_left == ASKS - 1:
+                answer_s = event.at - missing.asked_at
+                source.answer_s += WEIGHT * (answer_s - source.answer_s)
+            self._look_ahead()
+
+    def _skipped(self, source: _Source, before: PduPlaced, event: PduPlaced) -> None:
+        patience_s = RELAYED_PATIENCE_S if source.hears_relays else PATIENCE_S
+        inside = frozenset(_parts(before) & _parts(event))
+        first = max(event.number - event.n_skipped, event.number - MOST_MISSING)
+        for number in range(first, event.number):
+            source.missing[number % PDU_NUMBERS] = _Missing(
+                event.at, event.at + patience_s, inside
+            )
+        while len(source.missing) > MOST_MISSING:
+            del source.missing[next(iter(source.missing))]
+            self._given_up += 1
+        self._look_ahead()
+
+    def _count(self, source: _Source, number: int, missing: _Missing, at: float) -> None:
+        missing.asks_left -= 1
+        missing.asked_at = at
+        missing.next_at = at + source.again_s
+        if not missing.asks_left:
+            # Its answer may still come, but nobody asks again.
+            missing.next_at = inf
+
+    def _drop_needless(self, src: int, source: _Source, now: float) -> None:
+        for number, each in list(source.missing.items()):
+            is_over = bool(each.inside) and not any(
+                self._holds(src, *message) for message in each.inside
+            )
+            if is_over or each.since < now - KEEP_S:
+                del source.missing[number]
+                self._given_up += not is_over
+
+    def _awaits_parity(self, src: int, source: _Source, missing: _Missing) -> bool:
+        """Whether parity of the message around a missing PDU may still come."""
+        if not missing.inside or source.last is None:
+            return False
+        running = _parts(source.last)
+        return any(
+            message in running and (message[0] == PARTS or message[0] in source.has_parity)
+            for message in missing.inside
+        )
+
+    def _look_ahead(self) -> None:
+        self.due_at = min(
+            (each.next_at for source in self._sources.values() for each in source.missing.values()),
+            default=inf,
+        )
+
+
+def _parts(event: PduPlaced) -> set[tuple[int, int]]:
+    """(topic, entry id) of the longer messages of which a PDU holds fragments or parity."""
+    pdu, _, records, _ = event.read
+    found = {
+        (entry.topic_id, entry.entry_id)
+        for entry in pdu.entries
+        if entry.total > 1 and entry.topic_id != CONTROL_TOPIC_ID
+    }
+    return found | {(each.topic_id, each.entry_id) for each in records if isinstance(each, Parity)}

@@ -1,0 +1,31 @@
+"""The share of the air for PDUs that are sent again."""
+
+SAVED_S = 0.05
+"""Most airtime in s that is saved up."""
+
+
+class Budget:
+    """Airtime that grows with time at a given share, and is spent before it is earned."""
+
+    def __init__(self, share: float) -> None:
+        self._share = share
+        self._saved_s = SAVED_S
+        self._at = 0.0
+
+    def free_at(self, now: float) -> float:
+        """When something may be spent, at `now` or later."""
+        self._earn(now)
+        return now if self._saved_s > 0 else now - self._saved_s / self._share
+
+    def spend(self, airtime_s: float, now: float) -> None:
+        """Spend airtime, in s."""
+        self._earn(now)
+        self._saved_s -= airtime_s
+
+    def restart(self) -> None:
+        """Go on with another clock."""
+        self._at = 0.0
+
+    def _earn(self, now: float) -> None:
+        self._saved_s = min(SAVED_S, self._saved_s + self._share * max(0.0, now - self._at))
+        self._at = max(self._at, now)
