@@ -18,7 +18,7 @@ from phy.error_rate import (
 from phy.expected import Expected
 from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
 from phy.layout import BurstLayout, layout, most_pdus
-from phy.mcs import MCS_TABLE, Mcs
+from phy.mcs import MCS_TABLE, SLOWER_MCS, Mcs
 from phy.numerology import GRIDS, OFDM_64_8, OFDM_64_16, Numerology
 from phy.quality import COUNTERS, BurstOver, BurstQuality, Claim, Event, PduHeard
 from phy.sizes import SENSE_WINDOW
@@ -44,6 +44,7 @@ __all__ = [
     "PROFILES",
     "REACH",
     "SENSE_WINDOW",
+    "SLOWER_MCS",
     "BurstLayout",
     "BurstOver",
     "BurstQuality",

@@ -63,3 +63,16 @@ MCS_TABLE = tuple(
     )
 )
 """Every MCS, by index."""
+
+
+def _slower(mcs: Mcs) -> int:
+    lower = [
+        each
+        for each in MCS_TABLE
+        if each.rate == mcs.rate and each.modulation.bits < mcs.modulation.bits
+    ]
+    return max(lower, key=lambda each: each.modulation.bits, default=mcs).index
+
+
+SLOWER_MCS = tuple(map(_slower, MCS_TABLE))
+"""By MCS, the one with the same code rate and the next lower modulation, or itself."""

@@ -10,7 +10,7 @@ from zstandard import ZstdCompressionDict
 from sdrlinkd.link.access import AccessParams
 from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.qos import AS_CONFIGURED, Overrides
+from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos
 from sdrlinkd.link.queue import (
     DEFAULT_POLICY,
     NOT_TAKEN,
@@ -28,12 +28,14 @@ from sdrlinkd.link.receive import (
     Event,
     Newcomer,
     PduHeard,
+    PduPlaced,
     PduToRelay,
     Reception,
     RecordHeard,
     RelayParams,
     Retain,
 )
+from sdrlinkd.link.repeat import Answers, Asking, RepeatParams
 from sdrlinkd.link.report import NO_NAMES, Names, Reporter
 from sdrlinkd.link.schedule import ClassesParams, Forecasts
 from sdrlinkd.link.status import AirUse, Told, Why
@@ -65,10 +67,12 @@ from sdrlinkd.sealing import InTheClear, Sealing
 from sdrlinkd.wire import (
     FIRST_NUMBER,
     MAX_VALUE_SIZE,
+    PDU_NUMBERS,
     TLV_HEADER_SIZE,
     TOPIC_OVERHEAD,
     WANTED_OVERHEAD,
     Clock,
+    Need,
     Receipt,
     Registry,
     Topic,
@@ -80,6 +84,7 @@ from sdrlinkd.wire import (
 NO_DICTIONARIES: Mapping[int, ZstdCompressionDict] = {}
 NO_RELAY = RelayParams()
 NO_CLOCK = ClockParams(period_s=0.0)
+NO_REPEAT = RepeatParams(share=0.0)
 DEFAULT_CLASSES = ClassesParams()
 NOTHING_NOTED: Mapping[int, str] = {}
 
@@ -107,6 +112,7 @@ class Link:
         classes: ClassesParams = DEFAULT_CLASSES,
         relay: RelayParams = NO_RELAY,
         clock: ClockParams = NO_CLOCK,
+        repeat: RepeatParams = NO_REPEAT,
         dictionaries: Mapping[int, ZstdCompressionDict] = NO_DICTIONARIES,
         hears_self: bool = False,
         has_numbers: bool = False,
@@ -158,10 +164,16 @@ class Link:
         clock = clock if has_control else NO_CLOCK
         self._clocks = Clocks(clock, beacons.boot_id, own_id)
         self._tx_delays = TxDelayMeters()
+        self._asking = Asking(own_id, self._reception.holds, is_on=has_control and repeat.share > 0)
+        self._answers = Answers(
+            repeat, own_id, self._composer.entry_ids, has_control=has_control,
+            has_numbers=has_numbers, is_sealed=self.sealing.is_on,
+            twice=[qos for qos in Qos if classes.of(qos).twice],
+        )  # fmt: skip
         self._control_records = ControlRecords(
             clock, self._clocks, beacons, self._tx_delays, self._piggyback,
             self._reception.neighbors, TopicTeller(self._topics, piece), self._wants, self.sealing,
-            self._composer.k_single, own_id, clear_size,
+            self._asking, self._composer.k_single, own_id, clear_size,
         )  # fmt: skip
         self._forecasts = Forecasts()
         self._scheduler: BurstScheduler | NoRadio = NoRadio()
@@ -190,7 +202,7 @@ class Link:
             self._scheduler = BurstScheduler(
                 fit, self._outbox, self._composer, self._control_records, self._tx_delays,
                 self._forecasts, self._classes, self.own_id, self.registry.has_control,
-                self.sealing, self._clear_size,
+                self.sealing, self._answers, self._clear_size,
             )  # fmt: skip
         else:
             self._scheduler.refit(fit)
@@ -199,6 +211,7 @@ class Link:
             self._outbox.drop_all("tx_radio_down")
             self._intake.begin_anew()
             self.sealing.begin_anew()
+            self._answers.restart()
         self.sealing.opener.set_uncertainty(fit.stamp_s)
         self._clocks.set_resolution(fit.stamp_s)
 
@@ -401,6 +414,7 @@ class Link:
             scheduler.more_to_send()
         self._dispatch(self._reception.expire(now))
         self.sealing.look(now)
+        self._answers.expire(now)
         self._control_records.look_round(now, scheduler.record_pdu_s)
         self._control_records.tell_topics(now, scheduler.record_pdu_s)
         self._tell_dropped()
@@ -476,7 +490,11 @@ class Link:
                     self._scheduler.pdu_heard(event)
                 case RecordHeard():
                     self._record_heard(event)
+                case PduPlaced():
+                    self._asking.placed(event)
+                    self._answers.heard(event.read.pdu.src, event.number % PDU_NUMBERS)
                 case Newcomer():
+                    self._asking.forget(event.src)
                     # The new robot lacks the messages latched before.
                     self._latched.newcomer(event.src, event.at)
                     self._control_records.newcomer(event.at)
@@ -499,6 +517,11 @@ class Link:
             self._reception.take_waits(src, record)
         elif isinstance(record, Wanted):
             self._demand.hear(src, record, at)
+        elif isinstance(record, Need):
+            self._asking.others_need(record, at)
+            n_others = len(self._reception.neighbors.present(at))
+            self._answers.needed(src, record, at, n_others)
+            self._scheduler.more_to_send()
         else:
             self._scheduler.record_heard(src, record, at)
 

@@ -45,6 +45,9 @@ class PduLinkTraits(NamedTuple):
     mcs: int = 0
     """The configured MCS, used without rate control."""
     needed_snr_db: tuple[float, ...] = (0.0,)
+    slower: tuple[int, ...] = ()
+    """By MCS, the one with the same code rate and the next lower modulation, or itself; without an
+    entry: itself."""
     stamp_s: float = 2e-4
     """Largest error of the times at which bursts left and came."""
 

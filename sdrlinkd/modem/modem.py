@@ -35,8 +35,9 @@ class BurstOrder(NamedTuple):
     late_known: int
     mcs: int
     pdus: Sequence[bytes]
-    tells_times: bool = False
-    """Whether a burst that starts later must be adjusted; see `wire.postponed`."""
+    n_timed: int = 0
+    """How many PDUs, the first ones, must be adjusted if the burst starts later; see
+    `wire.postponed`."""
 
 
 class BurstReport(NamedTuple):

@@ -26,7 +26,7 @@ class OnAir:
         self._number += 1
         self._bursts[self._number] = burst
         return BurstOrder(
-            self._number, start, latest, self._late, burst.mcs, burst.pdus, burst.tells_times
+            self._number, start, latest, self._late, burst.mcs, burst.pdus, burst.n_timed
         )
 
     def take(self, report: BurstReport) -> Burst | None:

@@ -48,4 +48,5 @@ def pdu_link_traits(
         pdu_burst_s=airtimes.shortest_s(),
         mcs=params.mcs,
         needed_snr_db=airtimes.needed_snr_db(),
+        slower=phy.SLOWER_MCS,
     )

@@ -45,23 +45,13 @@ from sdrlinkd.wire.control import (
     MAX_AGE_US,
     MAX_SINCE,
     MAX_VALUE_SIZE,
-    NO_AGE,
     PARITY_OVERHEAD,
     RECEIPT_UNIT_S,
     STAMP_SIZE,
     TLV_HEADER_SIZE,
     TOPIC_OVERHEAD,
     WANTED_OVERHEAD,
-    Beacon,
-    Frame,
-    LinkReport,
-    Parity,
-    Receipt,
     Record,
-    RecordType,
-    Stamp,
-    Waits,
-    Wanted,
     build_records,
     parse_records,
 )
@@ -101,6 +91,18 @@ from sdrlinkd.wire.partials import Lost, Partial, ReassemblyLimits
 from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse
 from sdrlinkd.wire.readable import ControlEntries, numbered, read_control_entries, with_topic
 from sdrlinkd.wire.reassembly import Reassembly
+from sdrlinkd.wire.record_types import (
+    NO_AGE,
+    Beacon,
+    Frame,
+    LinkReport,
+    Parity,
+    Receipt,
+    RecordType,
+    Stamp,
+    Waits,
+    Wanted,
+)
 from sdrlinkd.wire.registry import (
     BROADCAST,
     CONTROL_TOPIC_ID,
@@ -118,6 +120,7 @@ from sdrlinkd.wire.repeat import (
     MAX_BITMAP,
     MAX_HELD_REPEAT,
     NEED_OVERHEAD,
+    PDU_NUMBER_SIZE,
     PDU_NUMBERS,
     REPEAT_SIZE,
     REPEAT_UNIT_S,
@@ -190,6 +193,7 @@ __all__ = [
     "PART_HEADER_SIZE",
     "PART_PARITY",
     "PDU_NUMBERS",
+    "PDU_NUMBER_SIZE",
     "RECEIPT_UNIT_S",
     "REPEAT_SIZE",
     "REPEAT_UNIT_S",

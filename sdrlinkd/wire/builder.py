@@ -4,9 +4,10 @@ import struct
 from functools import lru_cache
 
 from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, MAX_ENTRIES, entry_budget
-from sdrlinkd.wire.control import ASKS, STAMP_RECORD, STAMP_SIZE, TLV_HEADER_SIZE, RecordType
+from sdrlinkd.wire.control import ASKS, STAMP_RECORD, STAMP_SIZE, TLV_HEADER_SIZE
 from sdrlinkd.wire.crc import crc16
 from sdrlinkd.wire.declared import FIRST_NUMBER, number_octet
+from sdrlinkd.wire.record_types import RecordType
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID, DECLARED_TOPIC_ID
 
 VERSION = 0

@@ -2,9 +2,8 @@
 
 import struct
 from collections.abc import Callable, Iterable
-from enum import IntEnum
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire.clock import CLOCK_SIZE, Clock, build_clock, parse_clock
@@ -19,6 +18,18 @@ from sdrlinkd.wire.contact import (
     parse_key,
 )
 from sdrlinkd.wire.declared import TopicPiece, build_topic, parse_topic
+from sdrlinkd.wire.record_types import (
+    NO_AGE,
+    Beacon,
+    Frame,
+    LinkReport,
+    Parity,
+    Receipt,
+    RecordType,
+    Stamp,
+    Waits,
+    Wanted,
+)
 from sdrlinkd.wire.registry import BROADCAST, RegistryDigest
 from sdrlinkd.wire.repeat import (
     NEED_OVERHEAD,
@@ -35,132 +46,10 @@ from sdrlinkd.wire.repeat import (
 TLV_HEADER_SIZE = 2
 MAX_AGE_US = 0xFFFFFFFF
 MAX_VALUE_SIZE = 255
-NO_AGE = 0xFFFF
 RECEIPT_UNIT_US = 100
 RECEIPT_UNIT_S = RECEIPT_UNIT_US / 1e6
 MAX_SINCE = 0xFFFF
 """Largest time in a RECEIPT, in units of 0.1 ms."""
-
-
-class RecordType(IntEnum):
-    """Type of a control record, its first octet; numbers are never reused."""
-
-    STAMP = 1
-    BEACON = 2
-    DIGEST = 3
-    LINK_REPORT = 4
-    RECEIPT = 5
-    PARITY = 6
-    FRAME = 7
-    CLOCK = 8
-    WAITS = 9
-    NEED = 10
-    TOPIC = 15
-    WANTED = 17
-    REPEAT = 18
-    CONTACT = 19
-    KEY = 20
-
-
-class Stamp(NamedTuple):
-    """STAMP record: age of a message at its burst's preamble in µs; `asks`: a RECEIPT is wanted."""
-
-    topic_id: int
-    entry_id: int
-    age_us: int
-    asks: bool = False
-
-
-class Beacon(NamedTuple):
-    """BEACON record: `boot_id` changes with every start, `number` counts up modulo 2^16.
-
-    `pdu_number` is that of the PDU with the record, None if it is not told.
-    """
-
-    boot_id: int
-    number: int
-    pdu_number: int | None = None
-
-
-class LinkReport(NamedTuple):
-    """LINK_REPORT record: how well its sender hears `node` (wire document, 6.3).
-
-    SNR is in quarter decibels (signed), PER in 1/255; `mcs` is the MCS that the sender suggests.
-    """
-
-    node: int
-    snr_quarter_db: int
-    per_255: int
-    mcs: int
-
-
-class Frame(NamedTuple):
-    """FRAME record: the TDMA schedule that its sender keeps (wire document, 6.4).
-
-    `root` is the robot whose schedule it is, `level` the number of hops from there, `schedule` an
-    identification of its times, and `phase_us` the time in µs since the frame's start at this
-    burst's preamble.
-    """
-
-    root: int
-    level: int
-    schedule: int
-    phase_us: int
-
-
-class Receipt(NamedTuple):
-    """RECEIPT record: what became of a message of `node` at the sender (wire document, 6.7).
-
-    `node` 255 means the destination of this PDU. The message's age at that time (65535: unknown or
-    older) and the time since then are in units of 0.1 ms.
-    """
-
-    topic_id: int
-    entry_id: int
-    status: int
-    node: int = BROADCAST
-    age_100us: int = NO_AGE
-    since_100us: int = 0
-
-
-class Waits(NamedTuple):
-    """WAITS record: shares, in 1/255, of the wait of a topic's messages at their source.
-
-    They waited in the queue, for the channel, and for a retry after a burst that did not leave
-    (wire document, 6.8).
-    """
-
-    topic_id: int
-    queue: int
-    access: int
-    again: int
-
-
-class Wanted(NamedTuple):
-    """WANTED record: topics of `node` that consumers at the sender subscribe to, one octet each.
-
-    Wire document, 6.10.
-    """
-
-    node: int
-    topics: bytes
-
-
-class Parity(NamedTuple):
-    """PARITY record: octets from `at` on of a message's parity fragment `number`.
-
-    The message has `total` fragments of `k` octets, and `size` octets in all (wire document, 6.5).
-    """
-
-    topic_id: int
-    entry_id: int
-    total: int
-    n_parity: int
-    number: int
-    at: int
-    k: int
-    size: int
-    data: bytes
 
 
 FixedRecord = Stamp | Beacon | LinkReport | Receipt | Frame | Waits

@@ -11,11 +11,11 @@ from sdrlinkd.wire.control import (
     MAX_AGE_US,
     MAX_SINCE,
     RECEIPT_UNIT_US,
-    RecordType,
     record_spans,
 )
 from sdrlinkd.wire.crc import crc16
 from sdrlinkd.wire.pdu import identity
+from sdrlinkd.wire.record_types import RecordType
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
 from sdrlinkd.wire.repeat import HELD_AT
 

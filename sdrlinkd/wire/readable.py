@@ -6,9 +6,10 @@ See sections 6 and 4.4 of the wire document.
 from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
-from sdrlinkd.wire.control import Parity, Record, Stamp, parse_records
+from sdrlinkd.wire.control import Record, parse_records
 from sdrlinkd.wire.declared import FIRST_NUMBER, PARTS
 from sdrlinkd.wire.pdu import Entry, Pdu
+from sdrlinkd.wire.record_types import Parity, Stamp
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID, DECLARED_TOPIC_ID
 
 

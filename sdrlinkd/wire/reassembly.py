@@ -1,6 +1,5 @@
 """Joins fragments into messages (wire document, section 5.3)."""
 
-from sdrlinkd.wire.control import Parity
 from sdrlinkd.wire.declared import PARTS, Part
 from sdrlinkd.wire.partials import (
     FRAGMENT_OVERHEAD,
@@ -14,6 +13,7 @@ from sdrlinkd.wire.partials import (
     Source,
 )
 from sdrlinkd.wire.pdu import Entry
+from sdrlinkd.wire.record_types import Parity
 
 
 class Reassembly:

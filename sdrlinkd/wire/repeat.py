@@ -7,6 +7,7 @@ from typing import NamedTuple
 PDU_NUMBERS = 1 << 32
 """Count of PDU numbers, which wrap around."""
 PDU_NUMBER = struct.Struct(">I")
+PDU_NUMBER_SIZE = PDU_NUMBER.size
 MAX_BITMAP = 16
 """Most octets of the bitmap in a NEED record."""
 REPEAT_UNIT_S = 1e-4

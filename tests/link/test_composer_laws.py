@@ -55,7 +55,7 @@ def test_bursts_are_as_long_as_allowed_and_of_one_source(seed):
             stranger.submit(rng.randrange(3), bytes(rng.randrange(4, 200)), now)
             for data in compose(stranger, now).pdus:
                 pdu = parse(data, PDU_SIZE)
-                intake.forward(pdu, data, now, now + rng.choice((0.01, 1.0)), inf)
+                intake.forward(pdu, data, now, now + rng.choice((0.01, 1.0)), None, inf)
         elif action < 0.5:
             wishes = Overrides(rng.choice((None, *Qos)), dst=rng.choice((None, 2)))
             intake.submit(rng.randrange(3), bytes(rng.randrange(4, 600)), now, wishes)

@@ -186,7 +186,7 @@ def test_a_receipt_is_for_the_message_that_had_the_entry_id_then():
     air.run(1.5)
     for number in range(600):
         air.links[1].submit(0, message(number), air.now, Overrides(dst=2, receipt=f"m{number}"))
-        air.run(air.now + STEP_S)
+        air.run(air.now + 2 * STEP_S)
     air.run(air.now + RECEIPT_S + 0.5)
     assert Counter(each.fate for _, each in air.verdicts) == {"delivered": 600}
     assert air.links[1].report(air.now).receipts_unasked == 0
@@ -215,7 +215,7 @@ def test_a_receipt_that_waited_is_for_the_message_of_then():
         receipts.expect(asks, (), at)
     piggyback, draft = PiggybackRecords(), PduBuilder(128)
     piggyback.put_receipt(Receipt(0, 7, 1, 1, 100), 0.0, 10.01)
-    piggyback.ride(draft, 10.6)
+    piggyback.ride(draft, 10.6, 0)
     (told,) = records_in(draft.build(0, 1, 255, 0, 1), 128)
     assert told == Receipt(0, 7, 1, 1, 100, 5900)
     receipts.hear(2, told, 10.6)

@@ -22,8 +22,8 @@ from sdrlinkd.wire import (
     Need,
     Parity,
     Receipt,
-    Repeat,
     RegistryDigest,
+    Repeat,
     Stamp,
     TopicPiece,
     Waits,
@@ -38,10 +38,27 @@ SEED = 6
 CASES = 20_000
 
 # Number of octets that the fields of each type need (clause 6).
-NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8, 8: 24, 9: 4, 10: 6, 15: 4, 17: 1, 18: 8, 19: 8, 20: 5}
+NEED = {
+    1: 6,
+    2: 4,
+    3: 8,
+    4: 4,
+    5: 3,
+    6: 13,
+    7: 8,
+    8: 24,
+    9: 4,
+    10: 6,
+    15: 4,
+    17: 1,
+    18: 8,
+    19: 8,
+    20: 5,
+}
 # Types whose records may be longer than their fields.
 OPEN = (
-    RegistryDigest, Parity, Clock, Stamp, Receipt, TopicPiece, Wanted, Contact, KeyTold, Beacon, Need
+    RegistryDigest, Parity, Clock, Stamp, Receipt, TopicPiece, Wanted, Contact, KeyTold, Beacon,
+    Need,
 )  # fmt: skip
 
 octet = st.integers(0, 255)

@@ -31,7 +31,10 @@ from sdrlinkd.wire import (
     BROADCAST,
     ENTRY_HEADER_SIZE,
     MAX_ENTRIES,
+    PDU_NUMBERS,
     STAMP_SIZE,
+    Record,
+    build_records,
     equal_payload,
     flags,
 )
@@ -75,7 +78,8 @@ class Composer:
         self._src = src
         self._outbox = outbox
         self._piggyback = piggyback
-        self.next_seq = rng.randrange(256)
+        self.next_number = rng.randrange(256)
+        """The number of our next PDU; its lowest octet is the sequence number."""
         self._control_entry_id = rng.randrange(256)
         self._patience_s = reassembly_timeout_s
         self.entry_ids = TopicEntryIds(rng, REST_FACTOR * reassembly_timeout_s)
@@ -100,7 +104,8 @@ class Composer:
         All PDUs have one source, `source` if given: receivers derive from it who may send next.
         """
         built: list[BuiltPdu] = []
-        levels, most_of = self._outbox.levels, allowance.most
+        outbox, most_of = self._outbox, allowance.most
+        levels = outbox.levels
         # PDUs owed to a class take room from other classes and do not lengthen the burst.
         owed = list(allowance.owed[: max(1, max(most_of) - 1)])
         while levels and len(built) < MAX_PDUS:
@@ -109,7 +114,7 @@ class Composer:
                 source = built[0].src
             if owed and n + len(owed) >= most and (n or most < 2):
                 first = owed.pop(0)
-            elif owed and not n and self._next_src(owed[0]) != self._next_src():
+            elif owed and not n and outbox.next_relayed(owed[0]) != outbox.next_relayed():
                 # The owed PDU has another source, so it is sent alone.
                 first, owed, most = owed[0], [], 0
             elif n >= most:
@@ -130,10 +135,16 @@ class Composer:
             self._entries += len(pdu.carried)
         return built
 
-    def fill_with_records(self, start: float) -> list[BuiltPdu]:
-        """A PDU with only the waiting records, for a burst at `start`; empty if none waits."""
+    def fill_with_records(self, start: float, given: Sequence[Record] = ()) -> list[BuiltPdu]:
+        """A PDU with the records `given`, or else with those that wait, for a burst at `start`.
+
+        Empty if there is none.
+        """
         draft = Draft(self._pdu_size)
-        self._piggyback.ride(draft, start)
+        if given:
+            draft.add_record(build_records(given))
+        else:
+            self._piggyback.ride(draft, start, self.next_number)
         if draft.is_empty:
             return []
         draft.address(BROADCAST, Qos.DEFAULT)
@@ -173,10 +184,19 @@ class Composer:
         """Send no more fragments of the message that `lane` has begun."""
         self._head_of_line.abandon(lane, now)
 
-    def take_seq(self) -> int:
-        """Take the sequence number of our next PDU, for one that is made anew."""
-        seq, self.next_seq = self.next_seq, (self.next_seq + 1) & 0xFF
-        return seq
+    @property
+    def next_seq(self) -> int:
+        """The sequence number of our next PDU."""
+        return self.next_number & 0xFF
+
+    def forwarded(self, octets: bytes, held_s: float) -> bytes:
+        """Another robot's PDU, which came `held_s` before, for relaying it once more."""
+        return self._single_entry.forwarded(octets, held_s)
+
+    def take_number(self, n: int = 1) -> int:
+        """Take the number of our next PDU, and of `n` - 1 after it."""
+        number, self.next_number = self.next_number, (self.next_number + n) % PDU_NUMBERS
+        return number
 
     def end_flush(self) -> None:
         """From now on, no partly filled PDU waits for more messages."""
@@ -206,7 +226,7 @@ class Composer:
             if not may_be_own:
                 return None
             looked_at += len(level.lanes)
-            if draft.room >= self._k_shared or self._may_fit(level, draft.room):
+            if draft.room >= self._k_shared or self._writer.may_fit(level, draft.room):
                 self._fill_from(level, draft, start)
             if draft.room <= 0 or (looked_at > MAX_LANES_PER_PDU and not draft.is_empty):
                 break
@@ -217,7 +237,7 @@ class Composer:
                 if not message.stamped:
                     self._writer.stamp(draft, message, start)
         if self._piggyback.waiting and draft.dst == BROADCAST:
-            self._piggyback.ride(draft, start)
+            self._piggyback.ride(draft, start, self.next_number)
         return self._finish(draft)
 
     def _next_full(self, start: float, most: int, source: int | None) -> list[BuiltPdu]:
@@ -236,18 +256,9 @@ class Composer:
             return []
         if self._live(lane, start) is not head:
             return []
-        built = self._single_entry.filled(lane, start, self.next_seq, most)
-        self.next_seq = (self.next_seq + len(built)) & 0xFF
+        built = self._single_entry.filled(lane, start, self.next_number, most)
+        self.take_number(len(built))
         return built
-
-    def _next_src(self, first: Qos | None = None) -> int:
-        """Probable source of the next PDU, or of the next PDU of class `first`."""
-        levels = self._outbox.levels if self._outbox.relays else []
-        for level in [each for each in levels if first is None or each.qos is first][:1]:
-            head = level.lanes[0].head
-            if head is not None and head.is_whole:
-                return head.src
-        return self._src
 
     def _next_whole(self, level: Level, start: float) -> Outgoing | None:
         """The next message of a level, if it is another robot's PDU."""
@@ -266,25 +277,12 @@ class Composer:
 
     def _finish(self, draft: Draft) -> BuiltPdu:
         data = draft.build(
-            FLAGS[draft.qos, draft.is_compressed], self._src, draft.dst, self.next_seq,
-            self._hop_limit, self._control_entry_id,
+            FLAGS[draft.qos, draft.is_compressed], self._src, draft.dst,
+            self.next_number & 0xFF, self._hop_limit, self._control_entry_id,
         )  # fmt: skip
-        self.next_seq = (self.next_seq + 1) & 0xFF
+        self.next_number = (self.next_number + 1) % PDU_NUMBERS
         self._control_entry_id = (self._control_entry_id + 1) & 0xFF
         return BuiltPdu(data, draft.carried, draft.qos)
-
-    def _may_fit(self, level: Level, room: int) -> bool:
-        """Whether the next entry of any lane may fit; a quick no saves trying each lane.
-
-        Every fragment but a message's last has at least k_shared bytes.
-        """
-        if room >= self._k_shared or room <= 0:
-            return room > 0
-        for lane in level.lanes:
-            head = lane.current or lane.waiting[0]
-            if len(head.body) - head.next_index * head.k <= room:
-                return True
-        return False
 
     def _fill_from(self, level: Level, draft: Draft, start: float) -> None:
         lanes = tuple(level.lanes)
@@ -297,4 +295,4 @@ class Composer:
                     continue
                 if self._writer.place(lane, head, level, draft, start):
                     more = self._is_greedy
-            more = more and bool(level.lanes) and self._may_fit(level, draft.room)
+            more = more and bool(level.lanes) and self._writer.may_fit(level, draft.room)

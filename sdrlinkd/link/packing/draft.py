@@ -89,6 +89,19 @@ class EntryWriter:
         self.asking: list[Outgoing] = []
         """Messages just stamped whose producers want receipts."""
 
+    def may_fit(self, level: Level, room: int) -> bool:
+        """Whether the next entry of any lane may fit; a quick no saves trying each lane.
+
+        Every fragment but a message's last has at least k_shared bytes.
+        """
+        if room >= self._k_shared or room <= 0:
+            return room > 0
+        for lane in level.lanes:
+            head = lane.current or lane.waiting[0]
+            if len(head.body) - head.next_index * head.k <= room:
+                return True
+        return False
+
     def place(self, lane: Lane, head: Outgoing, level: Level, draft: Draft, start: float) -> bool:
         """Put the lane's next entry into the draft if it fits."""
         if head.parity:

@@ -7,6 +7,9 @@ from typing import NamedTuple
 from sdrlinkd.wire import (
     MAX_SINCE,
     RECEIPT_UNIT_S,
+    Beacon,
+    Clock,
+    Need,
     PduBuilder,
     Receipt,
     Record,
@@ -19,7 +22,7 @@ from sdrlinkd.wire import (
 LASTING = frozenset(
     {
         RecordType.CLOCK, RecordType.RECEIPT, RecordType.TOPIC, RecordType.WANTED,
-        RecordType.CONTACT,
+        RecordType.CONTACT, RecordType.NEED,
     }
 )  # fmt: skip
 """Record types that a new beacon does not replace."""
@@ -28,9 +31,20 @@ LASTING = frozenset(
 class _Waiting(NamedTuple):
     built: bytes
     due_at: float
-    receipt: Receipt | None = None
+    record: Receipt | Beacon | Clock | None = None
+    """A record that is made when it rides."""
     since: float = 0.0
-    """Time of the event that the receipt reports."""
+    """Time of the event that a RECEIPT reports."""
+
+    def as_of(self, start: float, number: int) -> bytes:
+        """The record in PDU `number`, whose burst leaves at `start`."""
+        record = self.record
+        if record is None:
+            return self.built
+        if isinstance(record, Receipt):
+            since = min(max(round((start - self.since) / RECEIPT_UNIT_S), 0), MAX_SINCE)
+            return build_records([record._replace(since_100us=since)])
+        return build_records([record._replace(pdu_number=number)])
 
 
 class PiggybackRecords:
@@ -57,9 +71,11 @@ class PiggybackRecords:
     def offer(self, records: Iterable[Record], due_at: float = -inf) -> None:
         """Add a beacon's records, which replace those of the last beacon."""
         kept = {key: each for key, each in self.waiting.items() if key[0] in LASTING}
-        built = (build_records([record]) for record in records)
-        # The two octets after the header distinguish records of one type.
-        self.waiting = {(*each[:1], *each[2:4]): _Waiting(each, due_at) for each in built}
+        self.waiting = {}
+        for record in records:
+            built = build_records([record])
+            # The two octets after the header distinguish records of one type.
+            self.waiting[*built[:1], *built[2:4]] = _Waiting(built, due_at, _made_later(record))
         self.waiting |= kept
         self._note_due()
 
@@ -67,8 +83,22 @@ class PiggybackRecords:
         """Add a record; it replaces one of its type, and then keeps that one's due time."""
         built = build_records([record])
         known = self.waiting.get((built[0],))
-        self.waiting[built[0],] = _Waiting(built, due_at if known is None else known.due_at)
+        due_at = due_at if known is None else known.due_at
+        self.waiting[built[0],] = _Waiting(built, due_at, _made_later(record))
         self._note_due()
+
+    def put_needs(self, needs: Iterable[Need], due_at: float) -> None:
+        """Replace all NEED records."""
+        for key in [key for key in self.waiting if key[0] == RecordType.NEED]:
+            del self.waiting[key]
+        for need in needs:
+            key = (int(RecordType.NEED), need.node, need.number)
+            self.waiting[key] = _Waiting(build_records([need]), due_at)
+        self._note_due()
+
+    def asked_nodes(self) -> set[int]:
+        """The robots that the waiting NEED records are about."""
+        return {key[1] for key in self.waiting if key[0] == RecordType.NEED}
 
     def put_receipt(self, receipt: Receipt, due_at: float, since: float) -> None:
         """Add a RECEIPT that reports an event at `since`."""
@@ -109,18 +139,22 @@ class PiggybackRecords:
             if key[0] == built[0]:
                 self.waiting[key] = each._replace(built=built)
 
-    def ride(self, pdu: PduBuilder, start: float) -> None:
-        """Move as many records as fit into `pdu`, whose burst leaves at `start`.
+    def ride(self, pdu: PduBuilder, start: float, number: int) -> None:
+        """Move as many records as fit into PDU `number`, whose burst leaves at `start`.
 
         Receipts older than their field can express are dropped: they could be mistaken for those of
         another message.
         """
         oldest = start - MAX_SINCE * RECEIPT_UNIT_S
         for key in [
-            key for key, each in self.waiting.items() if each.receipt and each.since < oldest
+            key
+            for key, each in self.waiting.items()
+            if isinstance(each.record, Receipt) and each.since < oldest
         ]:
             del self.waiting[key]
-        rides = [key for key, each in self.waiting.items() if pdu.add_record(_as_of(each, start))]
+        rides = [
+            key for key, each in self.waiting.items() if pdu.add_record(each.as_of(start, number))
+        ]
         for key in rides:
             del self.waiting[key]
         self._note_due()
@@ -129,8 +163,8 @@ class PiggybackRecords:
         self.due_at = min((each.due_at for each in self.waiting.values()), default=inf)
 
 
-def _as_of(waiting: _Waiting, start: float) -> bytes:
-    if waiting.receipt is None:
-        return waiting.built
-    since = min(max(round((start - waiting.since) / RECEIPT_UNIT_S), 0), MAX_SINCE)
-    return build_records([waiting.receipt._replace(since_100us=since)])
+def _made_later(record: Record) -> Beacon | Clock | None:
+    """A record that tells the number of the PDU with it, which is known when it rides."""
+    if isinstance(record, Beacon | Clock) and record.pdu_number is not None:
+        return record
+    return None

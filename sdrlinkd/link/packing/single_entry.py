@@ -24,11 +24,14 @@ class SingleEntry:
         head.advance(1, start)
         self._outbox.end(lane)
         self._outbox.served(lane)
-        held_us = max(0, round(1e6 * (start - head.arrived_at)))
-        pdu = head.payload
+        return BuiltPdu(self.forwarded(head.payload, start - head.arrived_at), [head], head.qos)
+
+    def forwarded(self, pdu: bytes, held_s: float) -> bytes:
+        """Another robot's PDU, which came `held_s` before, with one hop less."""
+        held_us = max(0, round(1e6 * held_s))
         if is_sealed(pdu):
-            return BuiltPdu(delayed(pdu, held_us, hops=1), [head], head.qos)
-        return BuiltPdu(forwarded(pdu, held_us, self._has_control), [head], head.qos)
+            return delayed(pdu, held_us, hops=1)
+        return forwarded(pdu, held_us, self._has_control)
 
     def fills_some(self, head: Outgoing) -> bool:
         """Whether the next fragment of `head` fills a PDU and is not the last one."""

@@ -12,8 +12,9 @@ from sdrlinkd.link.queue.compression import most_expanded
 from sdrlinkd.link.queue.latched import Offer
 from sdrlinkd.link.queue.ledger import TxTally, tx_balance
 from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
-from sdrlinkd.link.queue.message import Outgoing, Parting
+from sdrlinkd.link.queue.message import Outgoing
 from sdrlinkd.link.queue.outbox import Outbox
+from sdrlinkd.link.queue.parting import Parting
 from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.queue.topic_state import TopicState
 from sdrlinkd.link.schedule import ClassesParams
@@ -112,8 +113,8 @@ class Intake:
     ) -> str | None:  # fmt: skip
         """Queue another robot's PDU, which arrived at `at` and is worthless after `until`.
 
-        `number` is its PDU number, None if unknown. It gets the highest priority of its topics. Returns None, or the ledger's reason for
-        refusing it.
+        `number` is its PDU number, None if unknown. It gets the highest priority of its topics.
+        Returns None, or the ledger's reason for refusing it.
         """
         tally = self._relayed
         tally.accept()

@@ -7,24 +7,12 @@ Lanes of equal class and priority form a *level*.
 from collections import OrderedDict, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue.fate import STEPS, Fate, Step
 from sdrlinkd.link.queue.ledger import TxTally
-from sdrlinkd.wire import PARTS, Part, build_part, overhead
-
-
-class Parting(NamedTuple):
-    """How a large message is divided: octets of a part, and what each part says.
-
-    `number` is the topic's octet, and `serial` counts the topic's large messages modulo 2^16.
-    """
-
-    size: int
-    number: int
-    serial: int
-    wants_stamp: bool
+from sdrlinkd.link.queue.parting import Parting
+from sdrlinkd.wire import PARTS, overhead
 
 
 class Outgoing:
@@ -33,8 +21,9 @@ class Outgoing:
     __slots__ = (
         "_parting", "arrived_at", "body", "channel", "dst", "entry_id", "expires_at", "fate",
         "held_ids", "ids", "is_compressed", "is_expected", "is_whole", "k", "key", "lane",
-        "last_at", "next_index", "overhead", "parity", "parts_left", "payload", "pdu_number",
-        "priority", "qos", "receipt", "rests_id", "stamped", "tally", "topic_id", "total", "unconfirmed",
+        "last_at", "n_repeats", "next_index", "overhead", "parity", "parts_left", "payload",
+        "pdu_number", "priority", "qos", "receipt", "rests_id", "stamped", "tally", "topic_id",
+        "total", "unconfirmed",
     )  # fmt: skip
 
     def __init__(
@@ -52,7 +41,7 @@ class Outgoing:
         receipt: str = "",
         key: str = "",
         number: int | None = None,
-        parting: "Parting | None" = None,
+        parting: Parting | None = None,
         is_compressed: bool = False,
         is_whole: bool = False,
         pdu_number: int | None = None,
@@ -104,10 +93,12 @@ class Outgoing:
         """Number of PDUs with a part of the message whose outcome the radio has not reported."""
         self.parity: list[bytes] = []
         """Parity records that follow the last fragment, in reverse order."""
+        self.n_repeats = 0
+        """How often PDUs with parts of it were sent again."""
         self.is_expected = False
         """Whether receipts were requested from the receivers."""
         if parting is not None:
-            self.parts_left = -(-len(payload) // parting.size)
+            self.parts_left = parting.count_of(payload)
             self.channel = PARTS
             self._next_body()
         self.overhead = overhead(self.channel)
@@ -191,6 +182,10 @@ class Outgoing:
         """Note that one more PDU holds parity of the message."""
         self.unconfirmed += 1
 
+    def repeat(self) -> None:
+        """Note that one more PDU with a part of the message was sent again."""
+        self.n_repeats += 1
+
     def stamp(self) -> None:
         """Note that the message's age is in a PDU."""
         self.stamped = True
@@ -212,12 +207,8 @@ class Outgoing:
         self.unconfirmed -= 1
 
     def _next_body(self) -> None:
-        parting = self._parting
-        if parting is not None:
-            n = -(-len(self.payload) // parting.size)
-            at = n - self.parts_left
-            data = self.payload[at * parting.size : (at + 1) * parting.size]
-            self.body = build_part(Part(parting.number, parting.serial, at, n, data))
+        if self._parting is not None:
+            self.body = self._parting.part(self.payload, self.parts_left)
             self.parts_left -= 1
             self.next_index = self.total = 0
 

@@ -88,6 +88,15 @@ class Outbox:
             self.lives.drop(self.withdraw_head(self.levels[0].lanes[0]), reason)
         self.lives.drop_in_flight(reason)
 
+    def next_relayed(self, first: Qos | None = None) -> int | None:
+        """Probable source of the next PDU, or of the next one of class `first`; None: our own."""
+        levels = self.levels if self.relays else []
+        for level in [each for each in levels if first is None or each.qos is first][:1]:
+            head = level.lanes[0].head
+            if head is not None and head.is_whole:
+                return head.src
+        return None
+
     def served(self, lane: Lane) -> None:
         """Move a lane that gave an entry behind its equals, or remove it if it is empty."""
         head = lane.current or (lane.waiting[0] if lane.waiting else None)

@@ -26,8 +26,8 @@ class SequenceTrack:
     """
 
     __slots__ = (
-        "_anchor", "_doubtful", "_heard", "_heard_at", "_leap", "_order", "_seen", "_settled",
-        "fills", "is_numbered", "newest", "number", "restarts", "skipped",
+        "_anchor", "_doubtful", "_heard", "_heard_at", "_leap", "_newest_at", "_order", "_seen",
+        "_settled", "fills", "is_numbered", "newest", "number", "restarts", "skipped",
     )  # fmt: skip
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class SequenceTrack:
         # came; in the order of arrival.
         self._seen: dict[int, tuple[int, float]] = {}
         self._order: deque[int] = deque()
-        self._heard_at = -inf
+        self._heard_at = self._newest_at = -inf
         # Losses before `_anchor`, the first number of the present life; PDUs heard after it; and
         # numbers after it of which it is not known whether they were ever used.
         self._settled = 0
@@ -93,6 +93,7 @@ class SequenceTrack:
                 self.restarts -= 1
             self._leap = max(self._leap, step - 1)
             self.newest = number
+            self._newest_at = at
             self._heard += 1
         elif number in self._seen:
             if told is not None and self._seen[number][0] == crc:
@@ -105,8 +106,13 @@ class SequenceTrack:
         self._note(number, crc, at)
         return True
 
-    def before(self, number: int) -> float:
-        """When the last PDU before `number` came that is known, of the last 128; −inf: none is."""
+    def first_at(self, number: int, at: float) -> float:
+        """When PDU `number`, which came at `at`, may have been sent first: that of the PDU before.
+
+        −inf: none of the 128 before it was heard. A burst with a newer PDU brings no older ones.
+        """
+        if at == self._newest_at:
+            return at
         for each in range(number - 1, number - WINDOW, -1):
             if each in self._seen:
                 return self._seen[each][1]

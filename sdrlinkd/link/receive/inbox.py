@@ -23,6 +23,7 @@ from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
     PARTS,
+    PDU_NUMBERS,
     Beacon,
     Entry,
     Parity,
@@ -107,13 +108,14 @@ class Inbox:
         neighbor.heard_at(at)
         key = self._key(admitted, read)
         track = neighbor.track
-        if not track.heard(*key[1:], at, admitted.number or read.told, is_sealed=key[0]):
+        told = read.told if admitted.number is None else admitted.number
+        if not track.heard(*key[1:], at, told, is_sealed=key[0]):
             neighbor.count_duplicate()
             return self._drop("rx_dup", events)
         neighbor.count_new(pdu.hop, is_repaired=track.fills and admitted.number is not None)
-        if track.fills and not is_relayed:
+        if track.fills and not is_relayed and pdu.src in self._repeated.sources:
             # It may be a repeated PDU whose REPEAT was lost.
-            first_at = max(track.before(track.number), at - OLDEST_S)
+            first_at = max(track.first_at(track.number, at), at - OLDEST_S)
             read = self._reader.read(admitted, at - first_at)
         records, stamps = read.records, read.stamps
         if control.n_bad:
@@ -128,7 +130,7 @@ class Inbox:
             events.append(PduPlaced(read, track.number, track.skipped, is_ours or is_relay, at))
         if is_relay:
             until = min(at + self._relay.lifespan_s, self._fresh_until(pdu))
-            number = track.number if track.is_numbered else None
+            number = track.number % PDU_NUMBERS if track.is_numbered else None
             events.append(PduToRelay(pdu, admitted.raw, first_at, until, is_ours, number))
             if not is_ours:
                 return self._drop("rx_relayed", events)
@@ -151,6 +153,10 @@ class Inbox:
         self._ledger.use()
         self._take_entries(pdu, entries, neighbor, admitted, now, events)
         return events
+
+    def holds(self, src: int, topic_id: int, entry_id: int) -> bool:
+        """Whether fragments of a message are held that lacks others."""
+        return self._reassembly.holds(src, topic_id, entry_id)
 
     @property
     def held(self) -> Held:

@@ -121,6 +121,10 @@ class Reception:
         """(source, topic id) of command topics that fell silent, each once."""
         return self._handover.take_silent(now)
 
+    def holds(self, src: int, topic_id: int, entry_id: int) -> bool:
+        """Whether fragments of a message are held that lacks others."""
+        return self._inbox.holds(src, topic_id, entry_id)
+
     @property
     def relays(self) -> bool:
         """Whether this node relays PDUs of others."""

@@ -3,7 +3,7 @@
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from math import inf
+from math import ceil, inf
 from typing import NamedTuple
 
 from sdrlinkd.link.packing import TopicEntryIds
@@ -12,7 +12,15 @@ from sdrlinkd.link.queue import Outgoing
 from sdrlinkd.link.repeat.budget import Budget
 from sdrlinkd.link.repeat.kept import Kept, KeptPdus
 from sdrlinkd.link.repeat.params import RepeatParams
-from sdrlinkd.wire import BROADCAST, Need
+from sdrlinkd.wire import (
+    BROADCAST,
+    MAX_HELD_REPEAT,
+    PDU_NUMBERS,
+    REPEAT_SIZE,
+    REPEAT_UNIT_S,
+    Need,
+    Repeat,
+)
 
 UNION_S = 0.01
 """Time in s for which a PDU to everyone waits, so that one repetition serves all who ask."""
@@ -41,6 +49,27 @@ class RepeatGroup(NamedTuple):
     qos: Qos
     mcs: int
     is_relayed: bool
+
+    def first(self, n: int) -> "RepeatGroup":
+        """The first `n` of them."""
+        return self._replace(kept=self.kept[:n])
+
+    def told(self, start: float, room: int) -> tuple[list[Repeat], "RepeatGroup"]:
+        """(REPEAT records for a burst at `start`, of at most `room` octets, what they name)."""
+        runs: list[list[Kept]] = []
+        for kept in self.kept:
+            last = runs[-1][-1] if runs else None
+            if last and (last.number + 1, last.first_at) == (kept.number, kept.first_at):
+                runs[-1].append(kept)
+            elif (len(runs) + 1) * REPEAT_SIZE <= room:
+                runs.append([kept])
+            else:
+                break
+        records = [
+            Repeat(run[0].src, run[0].number, _held(start - run[0].first_at), len(run))
+            for run in runs
+        ]
+        return records, self.first(sum(map(len, runs)))
 
 
 class RepeatReport(NamedTuple):
@@ -72,7 +101,8 @@ class Answers:
         self._twice = frozenset(twice) if has_control else frozenset()
         self._kept = KeptPdus(entry_ids, has_numbers=has_numbers)
         self._budget = Budget(max(params.share, 1e-6))
-        self._wanted: dict[tuple[int, int], _Wanted] = {}
+        self.wanted: dict[tuple[int, int], _Wanted] = {}
+        """The PDUs that wait to be sent again, by source and number."""
         self._repeated_until: dict[tuple[int, int], float] = {}
         """Until when each PDU was on the air for the last time, as far as it was repeated."""
         self._newest: Counter[int] = Counter()
@@ -88,22 +118,29 @@ class Answers:
         self._slower = slower
 
     def sent(
-        self, numbers: Sequence[int | None], pdus: Sequence[bytes], plain: Sequence[bytes],
+        self, numbers: Sequence[int], pdus: Sequence[bytes], plain: Sequence[bytes],
         carried: Sequence[Sequence[Outgoing]], classes: Sequence[Qos], mcs: int, start: float,
     ) -> None:  # fmt: skip
-        """Keep the PDUs with messages of a burst that left at `start`."""
+        """Keep the PDUs with messages of a burst that left at `start`.
+
+        `numbers` are those of our own PDUs.
+        """
         if not (self.is_on or self._twice):
             return
         self._kept.forget(start)
         for number, octets, inner, messages, qos in zip(
             numbers, pdus, plain or pdus, carried, classes, strict=True
         ):
-            if number is None or not messages:
+            if not messages:
                 continue
-            kept = self._kept.keep(number, octets, inner or octets, mcs, qos, messages, start)
-            self._newest[kept.src] = max(self._newest[kept.src], number)
+            is_relayed = messages[0].is_whole
+            told = messages[0].pdu_number if is_relayed else number % PDU_NUMBERS
+            if told is None:
+                continue
+            kept = self._kept.keep(told, octets, inner or octets, mcs, qos, messages, start)
+            self._newest[kept.src] = max(self._newest[kept.src], told)
             if qos in self._twice and any(_is_short_lived(each) for each in messages):
-                self._wanted[kept.src, number] = _Wanted(kept, start + TWICE_AFTER_S)
+                self.wanted[kept.src, told] = _Wanted(kept, start + TWICE_AFTER_S)
 
     def needed(self, asker: int, need: Need, at: float, n_others: int) -> None:
         """Take a question that came at `at`, from one of `n_others` robots that hear us."""
@@ -122,25 +159,25 @@ class Answers:
             if self._repeated_until.get(key, -inf) >= at:
                 # It is on its way.
                 continue
-            known = self._wanted.get(key)
+            known = self.wanted.get(key)
             if known is None:
-                if len(self._wanted) >= MOST_WAITING:
+                if len(self.wanted) >= MOST_WAITING:
                     self._refused += 1
                     continue
                 for_all = kept.dst == BROADCAST and n_others > 1
-                known = self._wanted[key] = _Wanted(kept, at + UNION_S * for_all)
+                known = self.wanted[key] = _Wanted(kept, at + UNION_S * for_all)
             known.askers.add(asker)
 
     def heard(self, src: int, number: int) -> None:
         """Note that another robot has sent a PDU that we might repeat."""
-        self._wanted.pop((src, number), None)
+        self.wanted.pop((src, number), None)
 
     def due_at(self, now: float) -> float:
         """When the next PDU may be repeated; infinity: none waits."""
-        if not self._wanted:
+        if not self.wanted:
             return inf
-        twice_at = min((e.due_at for e in self._wanted.values() if not e.askers), default=inf)
-        asked_at = min((e.due_at for e in self._wanted.values() if e.askers), default=inf)
+        twice_at = min((e.due_at for e in self.wanted.values() if not e.askers), default=inf)
+        asked_at = min((e.due_at for e in self.wanted.values() if e.askers), default=inf)
         return min(twice_at, max(asked_at, self._budget.free_at(now)))
 
     def due_class(self, start: float) -> Qos | None:
@@ -179,7 +216,7 @@ class Answers:
         """Note that PDUs are in a burst of `airtime_s` at `start`."""
         each_s = airtime_s / len(group.kept)
         for kept in group.kept:
-            wanted = self._wanted.pop((kept.src, kept.number))
+            wanted = self.wanted.pop((kept.src, kept.number))
             self._repeated_until[kept.src, kept.number] = start + airtime_s
             if wanted.askers:
                 self._budget.spend(each_s, start)
@@ -199,7 +236,7 @@ class Answers:
         for kept in group.kept:
             key = kept.src, kept.number
             self._repeated_until.pop(key, None)
-            self._wanted.setdefault(key, _Wanted(kept, now, {kept.dst}))
+            self.wanted.setdefault(key, _Wanted(kept, now, {kept.dst}))
 
     def expire(self, now: float) -> None:
         """Forget what is too old to be repeated."""
@@ -214,7 +251,7 @@ class Answers:
     def restart(self) -> None:
         """Go on with another clock; what was sent before is forgotten."""
         self._kept.clear()
-        self._wanted.clear()
+        self.wanted.clear()
         self._repeated_until.clear()
         self._budget.restart()
 
@@ -227,10 +264,10 @@ class Answers:
     def _due(self, start: float) -> list[_Wanted]:
         is_free = self._budget.free_at(start) <= start
         due = []
-        for key, each in list(self._wanted.items()):
+        for key, each in list(self.wanted.items()):
             if each.kept.expires_at() <= start:
                 self._expired += 1
-                del self._wanted[key]
+                del self.wanted[key]
             elif each.due_at <= start and (is_free or not each.askers):
                 due.append(each)
         return due
@@ -244,3 +281,8 @@ class Answers:
 
 def _is_short_lived(message: Outgoing) -> bool:
     return message.expires_at - message.arrived_at < SHORT_LIFE_S
+
+
+def _held(held_s: float) -> int:
+    """A time in s in the unit of REPEAT, rounded up, so that ages are never too low."""
+    return min(max(0, ceil(held_s / REPEAT_UNIT_S)), MAX_HELD_REPEAT)

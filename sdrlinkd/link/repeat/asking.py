@@ -1,6 +1,6 @@
 """What this robot lacks of others, and when it asks for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from math import inf
 from typing import NamedTuple
@@ -78,6 +78,10 @@ class Asking:
         self._sources: dict[int, _Source] = {}
         self.due_at = inf
         """When to ask next."""
+        self.alone_at = inf
+        """When a question gets a PDU of its own."""
+        self.is_offered = False
+        """Whether questions wait for a burst."""
         self._offered: list[tuple[int, list[int]]] = []
         self._asked = self._given_up = 0
 
@@ -112,7 +116,7 @@ class Asking:
         for number in need.numbers():
             missing = source.missing.get(number)
             if missing is not None and missing.asked_at < at:
-                self._count(source, number, missing, at)
+                self._count(source, missing, at)
         self._look_ahead()
 
     def questions(self, now: float) -> list[Need]:
@@ -126,16 +130,18 @@ class Asking:
             due = sorted(
                 number
                 for number, each in source.missing.items()
-                if each.next_at <= now and not self._awaits_parity(src, source, each)
+                if each.next_at <= now and not self._awaits_parity(source, each, now)
             )
             if due:
                 self._offered.append((src, due))
                 found += needs(src, due)
+        self.is_offered = bool(found)
         self._look_ahead()
         return found
 
-    def alone_at(self) -> float:
-        """From when the questions just returned have a PDU of their own; infinity: never."""
+    @property
+    def offered_alone_at(self) -> float:
+        """From when the questions returned last have a PDU of their own; infinity: never."""
         waited = [
             min(self._sources[src].missing[number].next_at for number in numbers)
             for src, numbers in self._offered
@@ -143,22 +149,28 @@ class Asking:
         ]
         return min(waited, default=inf) + ALONE_S
 
-    def asked(self, start: float) -> None:
-        """Note that the questions returned last are in a burst at `start`."""
+    def asked(self, start: float, waiting: Collection[int]) -> None:
+        """Note that the questions returned last are in a burst at `start`.
+
+        Those about the robots `waiting` found no room.
+        """
         for src, numbers in self._offered:
+            if src in waiting:
+                continue
             source = self._sources[src]
             for number in numbers:
                 missing = source.missing.get(number)
                 if missing is not None:
                     self._asked += 1
-                    self._count(source, number, missing, start)
-        self._offered = []
+                    self._count(source, missing, start)
+        self._offered, self.is_offered = [], False
         self._look_ahead()
 
     def forget(self, src: int) -> None:
         """Forget what was missing of a robot that has restarted."""
         self._sources.pop(src, None)
         self._offered = [each for each in self._offered if each[0] != src]
+        self.is_offered = bool(self._offered)
         self._look_ahead()
 
     def report(self) -> AskingReport:
@@ -178,15 +190,13 @@ class Asking:
         inside = frozenset(_parts(before) & _parts(event))
         first = max(event.number - event.n_skipped, event.number - MOST_MISSING)
         for number in range(first, event.number):
-            source.missing[number % PDU_NUMBERS] = _Missing(
-                event.at, event.at + patience_s, inside
-            )
+            source.missing[number % PDU_NUMBERS] = _Missing(event.at, event.at + patience_s, inside)
         while len(source.missing) > MOST_MISSING:
             del source.missing[next(iter(source.missing))]
             self._given_up += 1
         self._look_ahead()
 
-    def _count(self, source: _Source, number: int, missing: _Missing, at: float) -> None:
+    def _count(self, source: _Source, missing: _Missing, at: float) -> None:
         missing.asks_left -= 1
         missing.asked_at = at
         missing.next_at = at + source.again_s
@@ -203,21 +213,27 @@ class Asking:
                 del source.missing[number]
                 self._given_up += not is_over
 
-    def _awaits_parity(self, src: int, source: _Source, missing: _Missing) -> bool:
-        """Whether parity of the message around a missing PDU may still come."""
-        if not missing.inside or source.last is None:
+    def _awaits_parity(self, source: _Source, missing: _Missing, now: float) -> bool:
+        """Whether parity of the message around a missing PDU may still come; then it waits."""
+        if not missing.inside or source.last is None or now - source.last.at > ALONE_S:
             return False
         running = _parts(source.last)
-        return any(
+        awaits = any(
             message in running and (message[0] == PARTS or message[0] in source.has_parity)
             for message in missing.inside
         )
+        if awaits:
+            missing.next_at = now + PATIENCE_S
+        return awaits
 
     def _look_ahead(self) -> None:
-        self.due_at = min(
-            (each.next_at for source in self._sources.values() for each in source.missing.values()),
-            default=inf,
-        )
+        self.due_at = self.alone_at = inf
+        for source in self._sources.values():
+            if source.missing:
+                next_at = min(each.next_at for each in source.missing.values())
+                self.due_at = min(self.due_at, next_at)
+                if source.useful > USEFUL:
+                    self.alone_at = min(self.alone_at, next_at + ALONE_S)
 
 
 def _parts(event: PduPlaced) -> set[tuple[int, int]]:

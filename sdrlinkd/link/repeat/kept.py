@@ -71,9 +71,10 @@ class KeptPdus:
             octets, start = first.payload, first.arrived_at
         elif any(message.rests_id for message in carried):
             pdu = parse(plain, len(plain), is_intact=True)
+            pdu = numbered(pdu) if self._has_numbers else pdu
             fragments = [
                 (id_, entry_id, self._entry_ids.times_taken(id_, entry_id))
-                for id_, entry_id, _, total, _ in (numbered(pdu) if self._has_numbers else pdu).entries
+                for id_, entry_id, _, total, _ in pdu.entries
                 if id_ != CONTROL_TOPIC_ID and (total > 1 or id_ == PARTS)
             ]
         kept = Kept(octets[1], number, octets, start, mcs, qos, carried, fragments)

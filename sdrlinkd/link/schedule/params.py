@@ -22,6 +22,9 @@ class ClassParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     be predicted; 0: that of the modem."""
     parity: Annotated[float, Meta(ge=0, le=1)] = 0.0
     """Parity fragments per fragment of a large message: the share of its PDUs that may be lost."""
+    twice: bool = False
+    """Whether messages with a lifespan below 0.1 s, for which a request to repeat them comes too
+    late, are sent twice, 5 ms apart."""
     lifespan_s: Lifespan = float("inf")
     """Age in s after which a message is not sent any more, if neither it nor its topic has a
     lifespan."""

@@ -69,8 +69,11 @@ class Clocks:
         """Send no more CLOCK records."""
         self.due_at = float("inf")
 
-    def record(self, start: float, room: int) -> Clock:
-        """The next CLOCK record, for a burst at `start`, with arrivals of at most `room` robots."""
+    def record(self, start: float, room: int, *, is_numbered: bool = False) -> Clock:
+        """The next CLOCK record, for a burst at `start`, with arrivals of at most `room` robots.
+
+        `is_numbered`: it has a place for the number of its PDU.
+        """
         self.due_at = start + RIDES_FROM * self._period_s
         stamped, left_s = self._number, start
         if self._left:
@@ -93,8 +96,9 @@ class Clocks:
             first = self._number * most % len(arrivals)
             arrivals = arrivals[first:] + arrivals[:first]
         return Clock(
-            self._boot_id, self._number, stamped, left_ns, wall_ns, error_us, tuple(arrivals[:most])
-        )
+            self._boot_id, self._number, stamped, left_ns, wall_ns, error_us,
+            tuple(arrivals[:most]), 0 if is_numbered else None,
+        )  # fmt: skip
 
     def rode(self) -> int:
         """Note that the record was put into a burst; returns its number."""

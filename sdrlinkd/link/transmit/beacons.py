@@ -19,8 +19,12 @@ class Beacons:
         self._period_s = period_s
         self._rng = rng
         self._digest = digest
-        if len(build_records([digest])) > equal_payload(pdu_size, 1):
+        room = equal_payload(pdu_size, 1)
+        if len(build_records([digest])) > room:
             self._digest = digest.shortened()
+        fits = len(build_records([Beacon(0, 0, 0), self._digest])) <= room
+        self._told = 0 if fits else None
+        """The place of the PDU number, if there is room for it."""
         self.boot_id = rng.randrange(1 << 16)
         self._number = 0
         self.due_at = 0.0 if period_s > 0 else inf
@@ -33,7 +37,10 @@ class Beacons:
         """The records of a beacon in a burst that leaves at `start`: our identity, and how well we
         hear each of `neighbors`.
         """
-        records: list[Record] = [Beacon(self.boot_id, self._number), self._digest]
+        records: list[Record] = [
+            Beacon(self.boot_id, self._number, self._told),
+            self._digest,
+        ]
         self._number = (self._number + 1) & 0xFFFF
         self.due_at = start + self._period_s * self._rng.uniform(1 - JITTER, 1 + JITTER)
         for src, snr_db, per in neighbors.take_qualities():

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outgoing
+from sdrlinkd.link.repeat import RepeatGroup
 
 
 class Burst(NamedTuple):
@@ -32,10 +33,15 @@ class Burst(NamedTuple):
     """Time from which the radio could have taken the burst."""
     clock: int | None = None
     """Number of the CLOCK record inside, if any."""
-    tells_times: bool = False
-    """Whether records inside may tell times up to `start`, such as ages; see `wire.postponed`."""
+    n_timed: int = 0
+    """How many PDUs, the first ones, may tell times up to `start`, such as ages; see
+    `wire.postponed`. Repeated PDUs stay as they are."""
     inner: list[bytes] = []  # noqa: RUF012  # never changed
     """The inner PDUs of sealed ones, empty for those of other robots; none if nothing is sealed."""
+    numbers: list[int] = []  # noqa: RUF012  # never changed
+    """The PDU number of each PDU of ours, without its wrapping around."""
+    repeated: RepeatGroup | None = None
+    """The PDUs inside that are repeated, if this is why the burst leaves."""
 
     def is_in_vain(self, now: float) -> bool:
         """Whether all messages inside have outlived their lifespans, and there are some."""

@@ -2,8 +2,9 @@
 
 It handles several kinds of records: beacons (with digest, link reports and WAITS), the schedule of
 the access policy (FRAME), clocks (CLOCK), RECEIPTs, declarations (TOPIC), what consumers here
-subscribe to (WANTED), and the proof that we are alive (CONTACT). Each record is made when it is
-due, uses spare room in a broadcast PDU, and from a certain time on gets its own PDU. Such a PDU
+subscribe to (WANTED), the PDUs that we lack (NEED), and the proof that we are alive (CONTACT). Each
+record is made when it is due, uses spare room in a broadcast PDU, and from a certain time on gets
+its own PDU. Such a PDU
 takes airtime from messages, and a half-duplex radio is deaf while it sends. So PDUs that hold only
 records take at most `clock.share` of the airtime, all robots together: with n robots, each sends at
 most one such PDU every n · pdu_s / share. This limits beacons, too, unless rate control or a
@@ -15,6 +16,7 @@ from math import inf
 from sdrlinkd.link.packing import BuiltPdu, PiggybackRecords
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.receive import Neighbors
+from sdrlinkd.link.repeat import Asking
 from sdrlinkd.link.timesync import ClockParams, Clocks
 from sdrlinkd.link.topics import TopicTeller, Wants
 from sdrlinkd.link.transmit.beacons import Beacons
@@ -26,6 +28,7 @@ from sdrlinkd.wire import (
     BROADCAST,
     CLOCK_SIZE,
     CONTROL_TOPIC_ID,
+    PDU_NUMBER_SIZE,
     Entry,
     Frame,
     Pdu,
@@ -61,11 +64,13 @@ class ControlRecords:
         teller: TopicTeller,
         wants: Wants,
         sealing: Sealing | InTheClear,
+        asking: Asking,
         record_room: int,
         own_id: int,
         clear_size: int,
     ) -> None:
         self._sealing = sealing
+        self._asking = asking
         self._own_id = own_id
         self._clear_size = clear_size
         self._params = params
@@ -78,7 +83,10 @@ class ControlRecords:
         self._wants = wants
         self._room = record_room
         self._told_version = 0
-        self._most_arrivals = (record_room - CLOCK_SIZE) // ARRIVAL_SIZE
+        self._is_numbered = record_room >= CLOCK_SIZE + PDU_NUMBER_SIZE + ARRIVAL_SIZE
+        """Whether CLOCK has room for the number of its PDU."""
+        room = record_room - CLOCK_SIZE - PDU_NUMBER_SIZE * self._is_numbered
+        self._most_arrivals = room // ARRIVAL_SIZE
         self.fits = self._most_arrivals > 0 or not params.period_s
         """Whether PDUs have room for CLOCK records, if these are configured."""
         if not self.fits:
@@ -87,6 +95,8 @@ class ControlRecords:
         """Shortest time in s between our PDUs that hold only records."""
         self.clock_waits = False
         """Whether a CLOCK waits for a burst."""
+        self.questions_wait = False
+        """Whether NEED records wait for a burst."""
         self.receipts_untold = 0
         """RECEIPT records for others that were never sent, as too many were waiting."""
         self._n_others = 0
@@ -99,7 +109,11 @@ class ControlRecords:
     def due_at(self) -> float:
         """Time from which a PDU with only records may be sent."""
         due_at = min(self._beacons.due_at, self._piggyback.due_at, self._sealing.key_due_at)
-        return min(due_at, self._clock_alone_at) if self._n_others else due_at
+        if not self._n_others:
+            return due_at
+        if self._asking.alone_at < inf:
+            due_at = min(due_at, self._alone_from(self._asking.alone_at))
+        return min(due_at, self._clock_alone_at)
 
     def is_due(self, start: float) -> bool:
         """Whether a waiting record gets its own PDU at `start`."""
@@ -130,6 +144,12 @@ class ControlRecords:
         if start >= self._clocks.due_at and self._n_others:
             self._offer_clock(start)
             cannot_wait = cannot_wait or start >= self._clock_overdue_at
+        if self._asking.due_at <= start or self._asking.is_offered:
+            self._piggyback.put_needs(
+                self._asking.questions(start), self._alone_from(self._asking.offered_alone_at)
+            )
+            self.questions_wait = self._asking.is_offered
+            cannot_wait = cannot_wait or self._piggyback.is_overdue(RecordType.NEED, start)
         if self._sealing.is_on:
             self._offer_contact(start)
             # Nothing of ours is believed before others have it.
@@ -143,6 +163,11 @@ class ControlRecords:
             return None
         self._clock_told_at = self._clock_offered_at
         return self._clocks.rode()
+
+    def took_questions(self, start: float) -> None:
+        """Note which questions are in the burst just composed, for `start`."""
+        self._asking.asked(start, self._piggyback.asked_nodes())
+        self.questions_wait = self._asking.is_offered
 
     def told_alone(self, start: float) -> None:
         """Note that a PDU with only records leaves at `start`."""
@@ -235,7 +260,8 @@ class ControlRecords:
         waited = self._piggyback.holds(RecordType.CLOCK)
         alone_at = max(start, self._clock_alone_at)
         self._clock_offered_at = start
-        self._piggyback.put(self._clocks.record(start, self._most_arrivals), alone_at)
+        clock = self._clocks.record(start, self._most_arrivals, is_numbered=self._is_numbered)
+        self._piggyback.put(clock, alone_at)
         self.clock_waits = True
         if not waited:
             self._clock_overdue_at = alone_at + self.period_s

@@ -27,6 +27,8 @@ class Fit(NamedTuple):
     """Longest time from a message's publication until this node knows of it."""
     stamp_s: float
     """Largest error of the times at which bursts left and came."""
+    slower: tuple[int, ...]
+    """By MCS, that with which its PDUs are repeated."""
     is_lockstep: bool
     """Whether the radio runs in lock-step; the link's time then starts with the radio."""
 
@@ -50,5 +52,6 @@ def fit_to(
         max(lengths_s, default=0.0) + 2 * traits.turnaround_s,
         traits.ahead_s if traits.is_lockstep else NOTICE_S,
         traits.stamp_s,
+        traits.slower,
         traits.is_lockstep,
     )

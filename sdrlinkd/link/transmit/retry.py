@@ -13,9 +13,9 @@ GIVE_UP_S = 2.0
 class RetryQueue:
     """Late bursts that wait for another slot, in order; the ages inside grow with the wait."""
 
-    def __init__(self, sealing: Sealing | InTheClear, next_seq: Callable[[], int]) -> None:
+    def __init__(self, sealing: Sealing | InTheClear, take_number: Callable[[], int]) -> None:
         self._sealing = sealing
-        self._next_seq = next_seq
+        self._take_number = take_number
         self.waiting: list[Burst] = []
         """The waiting bursts, in the order in which they were composed."""
         self.count = 0
@@ -37,10 +37,18 @@ class RetryQueue:
         """Take out the next burst, adjusted to leave at `start`."""
         burst = self.waiting.pop(0)
         by_us, inner = round(1e6 * (start - burst.start)), burst.inner or [b""] * len(burst.pdus)
-        later, next_seq = self._sealing.later, self._next_seq
-        moved = [
-            later(*each, by_us, start, next_seq) for each in zip(burst.pdus, inner, strict=True)
-        ]
+        numbers = list(burst.numbers)
+        moved = []
+        for i, each in enumerate(zip(burst.pdus, inner, strict=True)):
+
+            def next_seq(i: int = i) -> int:
+                numbers[i] = number = self._take_number()
+                return number & 0xFF
+
+            moved.append(self._sealing.later(*each, by_us, start, next_seq))
         return burst._replace(
-            pdus=[pdu for pdu, _ in moved], inner=[each for _, each in moved], start=start
+            pdus=[pdu for pdu, _ in moved],
+            inner=[each for _, each in moved],
+            start=start,
+            numbers=numbers,
         )

@@ -20,6 +20,7 @@ from sdrlinkd.link.packing import MAX_PDUS, BuiltPdu, Composer
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outbox
 from sdrlinkd.link.receive import PduHeard
+from sdrlinkd.link.repeat import Answers, RepeatGroup
 from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
 from sdrlinkd.link.traits import Opportunity
 from sdrlinkd.link.transmit.burst import Burst, Outcome
@@ -59,8 +60,9 @@ class BurstScheduler:
     def __init__(
         self, fit: Fit, outbox: Outbox, composer: Composer, control_records: ControlRecords,
         tx_delays: TxDelayMeters, forecasts: Forecasts, classes: ClassesParams, own_id: int,
-        has_control: bool, sealing: Sealing | InTheClear, clear_size: int,
+        has_control: bool, sealing: Sealing | InTheClear, answers: Answers, clear_size: int,
     ) -> None:  # fmt: skip
+        self._answers = answers
         self._outbox = outbox
         self._lives = outbox.lives
         self._composer = composer
@@ -75,7 +77,7 @@ class BurstScheduler:
         self._clear_size = clear_size
         self._numbers_at = -inf
         """Time in s at which there may be numbers for sealed PDUs again."""
-        self._retry = RetryQueue(sealing, composer.take_seq)
+        self._retry = RetryQueue(sealing, composer.take_number)
         self._used_s = dict.fromkeys(Qos, 0.0)
         """Airtime composed so far by the class of each PDU, in s; includes bursts that failed."""
         self.airtime_s = 0.0
@@ -97,6 +99,7 @@ class BurstScheduler:
         """Continue with another radio; waiting bursts and counters stay."""
         self._fit = fit
         self._access, self._rate = fit.settled.access, fit.rate
+        self._answers.set_slower(fit.slower)
         self._overheard = Overheard(fit, self._forecasts, self._own_id, self._has_control)
 
     def more_to_send(self) -> None:
@@ -114,6 +117,12 @@ class BurstScheduler:
         head, records_due_at = self._outbox.next_class(), records.due_at
         if self._ready_at is None:
             self._ready_at = earliest - self._fit.lead_s
+        if self._answers.wanted:
+            repeated = self._answers.due_class(earliest)
+            if repeated is not None and (head is None or repeated <= head):
+                burst = self._repeat(opportunity, repeated)
+                if burst is not None:
+                    return burst
         if head is None and earliest < records_due_at:
             return None
         qos, mcs = Qos.DEFAULT if head is None else head, rate.lowest
@@ -124,14 +133,14 @@ class BurstScheduler:
             return None
         start = slot.start
         sealing = self._sealing
-        if sealing.is_on and not sealing.may_send(start, composer.next_seq, MAX_PDUS):
-            self._numbers_at = start + TICK_S
+        if sealing.is_on and not self._may_seal(start, MAX_PDUS):
             return None
         allowance = self._allowance(slot, mcs, opportunity, start >= records_due_at)
         frame = access.frame(start) if access.keeps_schedule else None
         # A schedule's phase is valid only for the planned start.
         is_timed = frame is not None and records.tells_schedule(start)
         cannot_wait = records.collect(start, frame, rate)
+        first_number = composer.next_number
         built, n_records = self._fill(start, allowance, cannot_wait)
         if not built:
             if head is not None and allowance.until < inf:
@@ -139,6 +148,8 @@ class BurstScheduler:
                 self._held = _Held(since, allowance.until, is_settled=True)
             return None
         clock = records.took_clock() if records.clock_waits else None
+        if records.questions_wait:
+            records.took_questions(start)
         if self._held is not _NOT_HELD:
             self._kept_free(start)
         carried = [pdu.carried for pdu in built]
@@ -172,8 +183,9 @@ class BurstScheduler:
             n_records=n_records,
             ready_at=ready_at,
             clock=clock,
-            tells_times=self._has_control,
+            n_timed=len(pdus) * self._has_control,
             inner=inner,
+            numbers=list(range(first_number, first_number + len(built))),
         )
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
@@ -182,6 +194,9 @@ class BurstScheduler:
         if not is_sent:
             self._access.not_sent(burst.start)
         is_late = outcome is Outcome.LATE
+        if burst.repeated is not None:
+            self._settle_repeated(burst, burst.repeated, now, is_sent=is_sent)
+            return
         if is_late and self._retry.give_back(burst, now):
             self._entry_ids.not_left(chain.from_iterable(burst.carried))
             return
@@ -194,6 +209,10 @@ class BurstScheduler:
             self._bursts_sent += 1
             self._pdus_sent += len(burst.pdus)
             self._lives.left(burst.carried)
+            self._answers.sent(
+                burst.numbers, burst.pdus, burst.inner, burst.carried, burst.classes, burst.mcs,
+                burst.start,
+            )  # fmt: skip
             return
         self._bursts_failed += 1
         self._pdus_failed += len(burst.pdus)
@@ -213,7 +232,8 @@ class BurstScheduler:
         wakes_at = self._composer.next_wakeup(now)
         if wakes_at <= now and self._held.is_settled:
             wakes_at = self._held.until
-        return max(min(self._control_records.due_at, wakes_at), self._numbers_at)
+        wakes_at = min(self._control_records.due_at, wakes_at, self._answers.due_at(now))
+        return max(wakes_at, self._numbers_at)
 
     def clear(self) -> None:
         """Drop all bursts that wait for another slot."""
@@ -279,6 +299,85 @@ class BurstScheduler:
         is_timed = again.latest <= again.start
         latest = slot.start if is_timed else max(slot.start, slot.late_end - airtime_s)
         return burst._replace(latest=latest)
+
+    def _repeat(self, opportunity: Opportunity, qos: Qos) -> Burst | None:
+        """A burst with PDUs of class `qos` that others lack; None if it cannot leave now.
+
+        Our own come after a PDU that says how old they are. Those of others are forwarded again.
+        """
+        earliest, airtime_s, _, sensed, _ = opportunity
+        answers = self._answers
+        group = answers.group(earliest, MAX_PDUS - 1)
+        if group is None:
+            return None
+        mcs = group.mcs
+        slot = self._access.slot(Wish(earliest, qos, airtime_s(mcs, 2), sensed))
+        if slot is None:
+            return None
+        start = slot.start
+        if self._sealing.is_on and not self._may_seal(start, 1):
+            return None
+        most = self._allowance(slot, mcs, opportunity, must_tell=False).most[qos]
+        if airtime_s(mcs, 2) > slot.end - start:
+            # A slot that is made for faster bursts.
+            mcs = group.kept[0].mcs
+        n_told = 0 if group.is_relayed else 1
+        if most <= n_told or airtime_s(mcs, 1 + n_told) > slot.end - start:
+            return None
+        group = group.first(most - n_told)
+        if group.is_relayed:
+            pdus = [
+                self._composer.forwarded(kept.octets, start - kept.first_at) for kept in group.kept
+            ]
+        else:
+            repeats, group = group.told(start, self._composer.k_single)
+            told = self._composer.fill_with_records(start, repeats)
+            pdus = [pdu.data for pdu in told]
+            if self._sealing.is_on:
+                pdus, _ = self._sealed(pdus, start)
+            pdus += [kept.octets for kept in group.kept]
+        length_s = airtime_s(mcs, len(pdus))
+        answers.took(group, start, length_s)
+        self._spend(length_s, [qos] * len(pdus))
+        self._access.sent(start + length_s, self._relayed_src(pdus))
+        ready_at, self._ready_at = self._ready_at, None
+        self._number += 1
+        return Burst(
+            pdus,
+            [[] for _ in pdus],
+            [qos] * len(pdus),
+            mcs,
+            qos,
+            start,
+            max(start, slot.late_end - length_s),
+            length_s,
+            self._number,
+            first_start=start,
+            ready_at=ready_at or start,
+            n_timed=len(pdus) if group.is_relayed else n_told,
+            repeated=group,
+        )
+
+    def _settle_repeated(
+        self, burst: Burst, group: RepeatGroup, now: float, *, is_sent: bool
+    ) -> None:
+        if not is_sent:
+            self._bursts_failed += 1
+            self._pdus_failed += len(burst.pdus)
+            self._answers.not_left(group, now)
+            return
+        self._answers.left(group, burst.airtime_s)
+        self.airtime_s += burst.airtime_s
+        self._bursts_by_mcs[burst.mcs] += 1
+        self._bursts_sent += 1
+        self._pdus_sent += len(burst.pdus)
+
+    def _may_seal(self, start: float, n: int) -> bool:
+        """Whether there are numbers for `n` PDUs of ours in a burst at `start`."""
+        if self._sealing.may_send(start, self._composer.next_seq, n):
+            return True
+        self._numbers_at = start + TICK_S
+        return False
 
     def _fill(
         self, start: float, allowance: Allowance, cannot_wait: bool

@@ -52,7 +52,7 @@ class Order(msgspec.Struct, frozen=True, array_like=True, tag="order"):
     late_known: int
     mcs: int
     pdus: list[bytes]
-    tells_times: bool
+    n_timed: int
 
 
 class Progress(msgspec.Struct, frozen=True, array_like=True, tag="progress"):
@@ -140,8 +140,8 @@ class Ended(msgspec.Struct, frozen=True, array_like=True, tag="ended"):
 
 def order_of(order: BurstOrder) -> Order:
     """The message that tells a BurstOrder."""
-    number, start, latest, late_known, mcs, pdus, tells_times = order
-    return Order(number, start, latest, late_known, mcs, list(pdus), tells_times)
+    number, start, latest, late_known, mcs, pdus, n_timed = order
+    return Order(number, start, latest, late_known, mcs, list(pdus), n_timed)
 
 
 def status_of(status: ModemStatus) -> Status:

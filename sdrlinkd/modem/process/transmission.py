@@ -145,9 +145,9 @@ class Transmission:
             return order
         self.counters["bursts_postponed"] += 1
         pdus = order.pdus
-        if order.tells_times:
-            by_us = round(1e6 * by / self._rate_hz)
-            pdus = [leaves_later(pdu, by_us) for pdu in pdus]
+        if order.n_timed:
+            by_us, n = round(1e6 * by / self._rate_hz), order.n_timed
+            pdus = [*(leaves_later(pdu, by_us) for pdu in pdus[:n]), *pdus[n:]]
         return order._replace(start=start, pdus=pdus)
 
     def _hand_over(self, made: _Modulated) -> Awaitable[TxReport] | None:
