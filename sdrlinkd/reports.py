@@ -159,6 +159,8 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     """PDUs heard, without duplicates."""
     pdus_lost: int
     """PDUs lost, by gaps in the sequence numbers."""
+    pdus_repaired: int = 0
+    """PDUs lost at first that came when they were sent again; they are not in `pdus_lost`."""
     per: float
     """Share of its PDUs that were lost since the start, 0 to 1."""
     per_lately: float | None = None
@@ -281,6 +283,27 @@ class SecurityReport(msgspec.Struct, frozen=True, kw_only=True):
     """Why nothing is sent any more, as a sentence; empty: all is well."""
 
 
+class RepeatReport(msgspec.Struct, frozen=True, kw_only=True):
+    """Selective repeat: what was sent again, and what was asked for."""
+
+    pdus: int = 0
+    """PDUs sent again."""
+    airtime_s: float = 0.0
+    """Airtime of the bursts with these PDUs, in s."""
+    asked: int = 0
+    """PDUs asked of others, each as often as it was asked for."""
+    given_up: int = 0
+    """PDUs of others that were missing for so long that nobody repeats them."""
+    asked_of_us: int = 0
+    """PDUs that others asked for, each as often as it was asked for."""
+    unknown: int = 0
+    """Of these: never sent, not kept any more, or not for the robot that asked."""
+    expired: int = 0
+    """Of these: with messages that have all outlived their lifespans."""
+    refused: int = 0
+    """Of these: dropped as too many others waited."""
+
+
 class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """The link: ledgers, topics, neighbors, access, and use of the channel."""
 
@@ -322,6 +345,8 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Sealed PDUs."""
     relayed: RelayReport = RelayReport()
     """PDUs of other robots that this robot relays."""
+    repeats: RepeatReport = RepeatReport()
+    """PDUs sent again, and asked for."""
     fragments_repaired: int = 0
     """Lost fragments that were computed from parity."""
     receipts_untold: int = 0

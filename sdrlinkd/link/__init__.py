@@ -39,6 +39,7 @@ from sdrlinkd.link.receive import (
     RelayParams,
     Retain,
 )
+from sdrlinkd.link.repeat import RepeatParams
 from sdrlinkd.link.report import Names
 from sdrlinkd.link.schedule import (
     IDLE_SHARE,
@@ -50,6 +51,7 @@ from sdrlinkd.link.schedule import (
     ClassParams,
     DefaultParams,
     LatencyParams,
+    UrgentParams,
 )
 from sdrlinkd.link.status import Told
 from sdrlinkd.link.timesync import (
@@ -110,12 +112,14 @@ __all__ = [
     "ReassemblyParams",
     "Relay",
     "RelayParams",
+    "RepeatParams",
     "Retain",
     "Sensed",
     "Settled",
     "State",
     "Told",
     "TopicPolicy",
+    "UrgentParams",
     "Verdict",
     "Wall",
     "check_access",

@@ -181,7 +181,7 @@ class Link:
         self._reporter = Reporter(
             self._topics, self._heard_topics, digest, self._outbox, self._intake,
             self._composer, self._control_records, self._tx_delays, self._reception, self._receipts,
-            self._clocks, self.sealing, clear_size,
+            self._clocks, self.sealing, self._asking, self._answers, clear_size,
         )  # fmt: skip
 
     # The radio.

@@ -10,6 +10,7 @@ from sdrlinkd.link.packing import Composer
 from sdrlinkd.link.queue import Intake, Outbox
 from sdrlinkd.link.receipts import Receipts
 from sdrlinkd.link.receive import Reception
+from sdrlinkd.link.repeat import Answers, Asking
 from sdrlinkd.link.status import RateMeter
 from sdrlinkd.link.timesync import Clocks
 from sdrlinkd.link.topics import HeardTopics, OwnTopics
@@ -53,8 +54,11 @@ class Reporter:
         self, topics: OwnTopics, heard_topics: HeardTopics,
         digest: RegistryDigest, outbox: Outbox, intake: Intake, composer: Composer,
         control_records: ControlRecords, tx_delays: TxDelayMeters, reception: Reception,
-        receipts: Receipts, clocks: Clocks, sealing: Sealing | InTheClear, pdu_size: int,
+        receipts: Receipts, clocks: Clocks, sealing: Sealing | InTheClear, asking: Asking,
+        answers: Answers, pdu_size: int,
     ) -> None:  # fmt: skip
+        self._asking = asking
+        self._answers = answers
         self._sealing = sealing
         self._pdu_size = pdu_size
         self._own = topics
@@ -99,6 +103,7 @@ class Reporter:
             registry_digest=self._digest.overall.hex(),
             security=self._sealing.report(now),
             relayed=self._intake.report_relayed(),
+            repeats=self._asking.report(self._answers.report()),
             fragments_repaired=self._reception.fragments_repaired,
             receipts_untold=records.receipts_untold,
             receipts_unasked=self._receipts.unasked,

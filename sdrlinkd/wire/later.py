@@ -42,11 +42,15 @@ def postponed(pdu: bytes, by_us: int) -> bytes:
     return _with_crc(data)
 
 
-def aged(pdu: bytes, by_us: int) -> bytes:
-    """An inner PDU, whose times grow by the `by_us` µs for which its sealed PDU was delayed."""
+def aged(pdu: bytes, by_us: int, *, only_ages: bool = False) -> bytes:
+    """A PDU, or an inner PDU, whose times grow by the `by_us` µs for which it was delayed.
+
+    `only_ages`: those in RECEIPT and REPEAT stay.
+    """
     data = bytearray(pdu)
     _move(data, by_us, _FORWARDED)
-    _move_short(data, by_us, _SHORT_POSTPONED)
+    if not only_ages:
+        _move_short(data, by_us, _SHORT_POSTPONED)
     return _with_crc(data)
 
 

@@ -20,6 +20,7 @@ from sdrlinkd.link import (
     RateParams,
     ReassemblyParams,
     RelayParams,
+    RepeatParams,
 )
 from sdrlinkd.wire import (
     BROADCAST,
@@ -57,6 +58,7 @@ def make_link(
     dictionaries=None,
     beacon_s=0.0,
     clock=None,
+    repeat=None,
     has_numbers=False,
     **params,
 ):
@@ -73,6 +75,7 @@ def make_link(
         relay=relay or RelayParams(),
         dictionaries=dictionaries or {},
         clock=clock or ClockParams(period_s=0.0),
+        repeat=repeat or RepeatParams(share=0.0),
         has_numbers=has_numbers,
     )
     link.attach(PduLinkTraits(), AccessParams(), RateParams())

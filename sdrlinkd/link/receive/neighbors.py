@@ -157,6 +157,7 @@ class Neighbors:
                     last_heard_s_ago=max(0.0, now - each.last_heard_at),
                     pdus_heard=each.heard,
                     pdus_lost=lost,
+                    pdus_repaired=each.repaired,
                     per=lost / (each.heard + lost) if each.heard + lost else 0.0,
                     usual_gap_s=each.usual_gap_s,
                     duplicates=each.duplicates,

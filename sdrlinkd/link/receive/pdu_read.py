@@ -63,9 +63,9 @@ class PduReader:
     def read(self, admitted: Admitted, later_s: float | None = None) -> PduRead:
         """The fields of a PDU that was sent first `later_s` before; None: as its source says.
 
-        Raises PduError.
+        If the source does not say it, only ages grow. Raises PduError.
         """
-        is_opened = admitted.ticks is not None
+        is_opened, is_told = admitted.ticks is not None, later_s is None
         if later_s is None:
             # What is told of a sealed PDU is in its ages since it was opened.
             later_s = 0.0 if is_opened else admitted.at - admitted.first_at
@@ -74,7 +74,9 @@ class PduReader:
         pdu = parse(data, size, is_intact=is_opened)
         if later_s > 0 and self._has_control:
             try:
-                pdu = parse(aged(data, round(1e6 * later_s)), size, is_intact=True)
+                pdu = parse(
+                    aged(data, round(1e6 * later_s), only_ages=not is_told), size, is_intact=True
+                )
             except (IndexError, struct.error):
                 raise PduError("rx_entry", "entries that contradict themselves") from None
         control = read_control_entries(pdu) if self._has_control else _NO_CONTROL

@@ -24,8 +24,6 @@ class RepeatedPdus:
 
     def __init__(self) -> None:
         self._by_src: dict[int, tuple[float, dict[int, Repeated]]] = {}
-        self.sources: set[int] = set()
-        """The robots that have ever repeated something."""
 
     def __bool__(self) -> bool:
         return bool(self._by_src)
@@ -43,7 +41,6 @@ class RepeatedPdus:
             each = (number + i) % PDU_NUMBERS
             told[each & 0xFF] = Repeated(each, at - held_s)
         self._by_src[node] = at, told
-        self.sources.add(node)
         return True
 
     def find(self, src: int, seq: int, at: float) -> Repeated | None:

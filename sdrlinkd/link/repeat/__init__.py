@@ -5,17 +5,15 @@ to ask and what to repeat, and when. It sends nothing itself: bursts and records
 `transmit`.
 """
 
-from sdrlinkd.link.repeat.answers import Answers, RepeatGroup, RepeatReport
-from sdrlinkd.link.repeat.asking import Asking, AskingReport
+from sdrlinkd.link.repeat.answers import Answers, RepeatGroup
+from sdrlinkd.link.repeat.asking import Asking
 from sdrlinkd.link.repeat.kept import Kept
 from sdrlinkd.link.repeat.params import RepeatParams
 
 __all__ = [
     "Answers",
     "Asking",
-    "AskingReport",
     "Kept",
     "RepeatGroup",
     "RepeatParams",
-    "RepeatReport",
 ]

@@ -12,6 +12,7 @@ from sdrlinkd.link.queue import Outgoing
 from sdrlinkd.link.repeat.budget import Budget
 from sdrlinkd.link.repeat.kept import Kept, KeptPdus
 from sdrlinkd.link.repeat.params import RepeatParams
+from sdrlinkd.reports import RepeatReport
 from sdrlinkd.wire import (
     BROADCAST,
     MAX_HELD_REPEAT,
@@ -70,18 +71,6 @@ class RepeatGroup(NamedTuple):
             for run in runs
         ]
         return records, self.first(sum(map(len, runs)))
-
-
-class RepeatReport(NamedTuple):
-    """What was repeated so far; `unknown`: PDUs that were asked for and are not kept (any more)."""
-
-    pdus: int = 0
-    airtime_s: float = 0.0
-    asked: int = 0
-    unknown: int = 0
-    expired: int = 0
-    refused: int = 0
-    """PDUs asked for that waited behind too many others."""
 
 
 class Answers:
@@ -258,7 +247,12 @@ class Answers:
     def report(self) -> RepeatReport:
         """What was repeated so far."""
         return RepeatReport(
-            self._pdus, self._airtime_s, self._asked, self._unknown, self._expired, self._refused
+            pdus=self._pdus,
+            airtime_s=self._airtime_s,
+            asked_of_us=self._asked,
+            unknown=self._unknown,
+            expired=self._expired,
+            refused=self._refused,
         )
 
     def _due(self, start: float) -> list[_Wanted]:

@@ -3,9 +3,11 @@
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from math import inf
-from typing import NamedTuple
+
+import msgspec
 
 from sdrlinkd.link.receive import PduPlaced
+from sdrlinkd.reports import RepeatReport
 from sdrlinkd.wire import CONTROL_TOPIC_ID, PARTS, PDU_NUMBERS, Need, Parity, needs
 
 PATIENCE_S = 0.005
@@ -56,13 +58,6 @@ class _Source:
     @property
     def again_s(self) -> float:
         return min(max(2 * self.answer_s, LEAST_AGAIN_S), MOST_AGAIN_S)
-
-
-class AskingReport(NamedTuple):
-    """Questions so far: `asked` counts each PDU as often as it was asked for."""
-
-    asked: int = 0
-    given_up: int = 0
 
 
 class Asking:
@@ -173,9 +168,9 @@ class Asking:
         self.is_offered = bool(self._offered)
         self._look_ahead()
 
-    def report(self) -> AskingReport:
-        """Counts of questions so far."""
-        return AskingReport(self._asked, self._given_up)
+    def report(self, answers: RepeatReport) -> RepeatReport:
+        """The report on what others asked us, and what we asked them."""
+        return msgspec.structs.replace(answers, asked=self._asked, given_up=self._given_up)
 
     def _filled(self, source: _Source, event: PduPlaced) -> None:
         missing = source.missing.pop(event.number % PDU_NUMBERS, None)

@@ -135,7 +135,9 @@ class BurstScheduler:
         sealing = self._sealing
         if sealing.is_on and not self._may_seal(start, MAX_PDUS):
             return None
-        allowance = self._allowance(slot, mcs, opportunity, start >= records_due_at)
+        allowance = self._allowance(
+            slot, mcs, opportunity, Qos.DEFAULT if start >= records_due_at else None
+        )
         frame = access.frame(start) if access.keeps_schedule else None
         # A schedule's phase is valid only for the planned start.
         is_timed = frame is not None and records.tells_schedule(start)
@@ -317,7 +319,7 @@ class BurstScheduler:
         start = slot.start
         if self._sealing.is_on and not self._may_seal(start, 1):
             return None
-        most = self._allowance(slot, mcs, opportunity, must_tell=False).most[qos]
+        most = self._allowance(slot, mcs, opportunity, qos).most[qos]
         if airtime_s(mcs, 2) > slot.end - start:
             # A slot that is made for faster bursts.
             mcs = group.kept[0].mcs
@@ -404,17 +406,19 @@ class BurstScheduler:
         return built + alone, len(alone)
 
     def _allowance(
-        self, slot: Slot, mcs: int, opportunity: Opportunity, must_tell: bool
+        self, slot: Slot, mcs: int, opportunity: Opportunity, further: Qos | None
     ) -> Allowance:
-        """How many PDUs of each class a burst in `slot` may hold."""
+        """How many PDUs of each class a burst in `slot` may hold.
+
+        `further`: the class of what is sent besides messages: records, or repeated PDUs.
+        """
         airtime_s, made_by, longest_s = (
             opportunity.airtime_s, opportunity.made_by, slot.end - slot.start
         )  # fmt: skip
         access, fit = self._access, self._fit
         asked = self._outbox.waiting_classes()
-        if must_tell:
-            # Records are of the default class.
-            asked.add(Qos.DEFAULT)
+        if further is not None:
+            asked.add(further)
         one_s, two_s = airtime_s(mcs, 1), airtime_s(mcs, 2)
         if two_s > one_s:
             self.bytes_per_s = self._composer.k_single / (two_s - one_s)
