@@ -131,6 +131,7 @@ async def _open(
         rng,
         classes=config.classes,
         relay=config.relay,
+        repeat=config.repeat,
         clock=config.clock,
         dictionaries=setup.dictionaries,
         hears_self=config.hears_self,

@@ -31,6 +31,7 @@ from sdrlinkd.link import (
     RateParams,
     ReassemblyParams,
     RelayParams,
+    RepeatParams,
     TopicPolicy,
 )
 from sdrlinkd.sealing import SecurityParams
@@ -96,6 +97,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     reassembly: ReassemblyParams = ReassemblyParams()
     classes: ClassesParams = ClassesParams()
     relay: RelayParams = RelayParams()
+    repeat: RepeatParams = RepeatParams()
     security: SecurityParams = SecurityParams()
     clock: ClockParams = ClockParams()
     chrony: ChronyParams = ChronyParams()

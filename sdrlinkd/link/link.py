@@ -164,7 +164,7 @@ class Link:
         clock = clock if has_control else NO_CLOCK
         self._clocks = Clocks(clock, beacons.boot_id, own_id)
         self._tx_delays = TxDelayMeters()
-        self._asking = Asking(own_id, self._reception.holds, is_on=has_control and repeat.share > 0)
+        self._asking = Asking(self._reception.holds, repeat.share if has_control else 0.0)
         self._answers = Answers(
             repeat, own_id, self._composer.entry_ids, has_control=has_control,
             has_numbers=has_numbers, is_sealed=self.sealing.is_on,
@@ -212,6 +212,7 @@ class Link:
             self._intake.begin_anew()
             self.sealing.begin_anew()
             self._answers.restart()
+            self._asking.restart()
         self.sealing.opener.set_uncertainty(fit.stamp_s)
         self._clocks.set_resolution(fit.stamp_s)
 

@@ -2,6 +2,7 @@
 
 from random import Random
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -90,3 +91,71 @@ def test_a_restart_that_looks_like_a_step_ahead_adds_no_losses(first, second, be
     assert 0 <= track.lost <= 2
     if 13 <= (second - first) & 0xFF < 128:
         assert track.lost == 2
+
+
+def numbered(track, first, n, *, at, every_s, told=()):
+    """Hear `n` PDUs from number `first` on, of which those in `told` tell their number."""
+    for i in range(first, first + n):
+        assert track.heard(
+            i & 0xFF, i & 0xFFFF, at + (i - first) * every_s, i if i in told else None
+        )
+
+
+@pytest.mark.parametrize("outage", [1, 44, 127, 128, 150, 254, 255, 256, 300, 511, 512, 5000])
+@pytest.mark.parametrize("before", [10, 300, 1000])
+def test_an_outage_of_any_length_is_counted_when_a_number_is_told(outage, before):
+    track = SequenceTrack()
+    numbered(track, 70, before, at=0.0, every_s=0.01, told=(75,))
+    after = 70 + before + outage
+    numbered(track, after, 30, at=20.0 + 0.01 * before, every_s=0.01, told=(after + 20,))
+    assert (track.lost, track.restarts) == (outage, 0)
+    assert track.newest == after + 29
+
+
+def test_a_number_that_no_source_could_have_reached_is_not_believed():
+    track = SequenceTrack()
+    numbered(track, 0, 100, at=0.0, every_s=0.01, told=(0,))
+    assert track.heard(100, 1, 1.0, 100 + (1 << 31))
+    assert track.heard(101, 2, 1.01, 101)
+    assert (track.lost, track.newest) == (0, 101)
+
+
+def test_numbers_wrap_around():
+    track = SequenceTrack()
+    for i in range(200):
+        number = (1 << 32) - 100 + i
+        assert track.heard(number & 0xFF, i, 0.01 * i, number % (1 << 32))
+    assert track.lost == 0
+    assert track.newest == (1 << 32) + 99
+
+
+def test_a_repeated_pdu_is_known_by_its_number_for_a_second():
+    track = SequenceTrack()
+    numbered(track, 0, 1000, at=0.0, every_s=0.001, told=range(0, 1000, 10))
+    assert not track.heard(300 & 0xFF, 300, 1.0, 300)
+    # Another PDU of the same sequence number and content is not a copy.
+    assert track.heard(1000 & 0xFF, 1000 - 256, 1.0)
+
+
+@law(60)
+@given(st.integers(0, 2**32), st.floats(0, 0.5), st.integers(0, (1 << 32) - 1))
+def test_what_is_repeated_fills_the_gap_once(seed, loss, first):
+    rng = Random(seed)
+    track, missing, heard = SequenceTrack(), [], []
+    for i in range(600):
+        number, at = (first + i) % (1 << 32), 0.002 * i
+        if i and rng.random() < loss:
+            missing.append((i, number))
+            continue
+        told = number if i == 0 or rng.random() < 0.1 else None
+        assert track.heard(number & 0xFF, i, at, told)
+        heard.append((i, number))
+        if missing and rng.random() < 0.3:
+            again = missing.pop(rng.randrange(len(missing)))
+            assert track.heard(again[1] & 0xFF, again[0], at, again[1])
+            assert track.fills
+            heard.append(again)
+        again = rng.choice([each for each in heard if each[0] > i - 400])
+        assert not track.heard(again[1] & 0xFF, again[0], at, again[1])
+    assert track.restarts == 0
+    assert track.lost == max(i for i, _ in heard) + 1 - len(heard)

@@ -23,6 +23,7 @@ from sdrlinkd.link import (
     RateParams,
     ReassemblyParams,
     RelayParams,
+    RepeatParams,
     TopicPolicy,
 )
 from sdrlinkd.sealing import Key, Remembered, Sealing, SecurityParams
@@ -86,6 +87,7 @@ class Robot:
             classes=ClassesParams(),
             relay=self.relay,
             clock=ClockParams(),
+            repeat=RepeatParams(),
             sealing=self.sealing,
         )
         self.link.set_policy(0, TopicPolicy(qos="urgent", lifespan_s=LIFESPAN_S))

@@ -8,6 +8,8 @@ from sdrlinkd.wire import PDU_NUMBERS, nearest_number
 WINDOW = 128
 KEEP_S = 1.0
 """Time in s for which a PDU is known again; repeated ones come up to this late."""
+REORDERED = 64
+"""How far behind the newest one a PDU may be that was sent before the first one heard."""
 MOST_PER_S = 20_000
 """More PDUs than any source sends in a second."""
 
@@ -26,8 +28,8 @@ class SequenceTrack:
     """
 
     __slots__ = (
-        "_anchor", "_doubtful", "_heard", "_heard_at", "_leap", "_newest_at", "_order", "_seen",
-        "_settled", "fills", "is_numbered", "newest", "number", "restarts", "skipped",
+        "_anchor", "_doubtful", "_heard", "_leap", "_newest_at", "_order", "_seen",
+        "_settled", "_told_at", "fills", "is_numbered", "newest", "number", "restarts", "skipped",
     )  # fmt: skip
 
     def __init__(self) -> None:
@@ -46,7 +48,7 @@ class SequenceTrack:
         # came; in the order of arrival.
         self._seen: dict[int, tuple[int, float]] = {}
         self._order: deque[int] = deque()
-        self._heard_at = self._newest_at = -inf
+        self._told_at = self._newest_at = -inf
         # Losses before `_anchor`, the first number of the present life; PDUs heard after it; and
         # numbers after it of which it is not known whether they were ever used.
         self._settled = 0
@@ -95,9 +97,9 @@ class SequenceTrack:
             self.newest = number
             self._newest_at = at
             self._heard += 1
-        elif number in self._seen:
-            if told is not None and self._seen[number][0] == crc:
-                return False
+        elif number in self._seen and told is not None and self._seen[number][0] == crc:
+            return False
+        elif number in self._seen or (told is None and not self._may_be_late(number)):
             self._jump(seq, crc, at)
             return True
         else:
@@ -131,6 +133,7 @@ class SequenceTrack:
     def _begin(self, number: int, crc: int, at: float, *, is_told: bool) -> None:
         self.newest = self._anchor = number
         self.is_numbered = is_told
+        self._told_at = at
         self._heard = self._doubtful = self._leap = 0
         self._seen.clear()
         self._order.clear()
@@ -152,12 +155,15 @@ class SequenceTrack:
         """
         if not self.is_numbered:
             self._shift(nearest_number(told, number & 0xFF) - number)
-            self.is_numbered = True
+            self.is_numbered, self._told_at = True, at
             return nearest_number(told, number & 0xFF)
         off = (told - self.newest + PDU_NUMBERS // 2) % PDU_NUMBERS - PDU_NUMBERS // 2
         believed = self.newest + off
-        most = 256 + MOST_PER_S * (at - self._heard_at)
-        return believed if -MOST_PER_S * KEEP_S < off <= most else number
+        if not -MOST_PER_S * KEEP_S < off <= 256 + MOST_PER_S * (at - self._told_at):
+            return number
+        if off >= 0:
+            self._told_at = at
+        return believed
 
     def _shift(self, by: int) -> None:
         """Renumber everything, as the true number of a PDU is known."""
@@ -165,6 +171,10 @@ class SequenceTrack:
         self._anchor += by
         self._seen = {number + by: each for number, each in self._seen.items()}
         self._order = deque(number + by for number in self._order)
+
+    def _may_be_late(self, number: int) -> bool:
+        """Whether a PDU before the newest one may have been missing until now."""
+        return number >= self._order[0] or self.newest - number < REORDERED
 
     def _is_known(self, seq: int, crc: int, reach: float) -> bool:
         """Whether the PDU was heard among the last `reach` ones.
@@ -183,7 +193,6 @@ class SequenceTrack:
 
     def _note(self, number: int, crc: int, at: float) -> None:
         self.number = number
-        self._heard_at = at
         self._seen[number] = crc, at
         self._order.append(number)
 

@@ -39,7 +39,7 @@ from sdrlinkd.wire import (
 )
 
 OLDEST_S = 10.0
-"""Largest age in s that a PDU without a word on it may have."""
+"""Largest time in s that is added to the ages in a PDU of unknown origin."""
 
 
 class Inbox:

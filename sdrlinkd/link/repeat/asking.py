@@ -7,6 +7,7 @@ from math import inf
 import msgspec
 
 from sdrlinkd.link.receive import PduPlaced
+from sdrlinkd.link.repeat.budget import Budget
 from sdrlinkd.reports import RepeatReport
 from sdrlinkd.wire import CONTROL_TOPIC_ID, PARTS, PDU_NUMBERS, Need, Parity, needs
 
@@ -63,13 +64,14 @@ class _Source:
 class Asking:
     """The PDUs that are missing, by source, and when to ask for them.
 
-    `holds(src, topic, entry id)`: whether fragments of a message are held that lacks others.
+    `holds(src, topic, entry id)`: whether fragments of a message are held that lacks others. PDUs
+    that hold only questions take at most `share` of the air.
     """
 
-    def __init__(self, own_id: int, holds: Holds, *, is_on: bool) -> None:
-        self._own_id = own_id
+    def __init__(self, holds: Holds, share: float) -> None:
         self._holds = holds
-        self._is_on = is_on
+        self._is_on = share > 0
+        self._budget = Budget(share)
         self._sources: dict[int, _Source] = {}
         self.due_at = inf
         """When to ask next."""
@@ -78,12 +80,14 @@ class Asking:
         self.is_offered = False
         """Whether questions wait for a burst."""
         self._offered: list[tuple[int, list[int]]] = []
+        self._free_at = -inf
+        """When the share of the air allows a PDU with questions."""
         self._asked = self._given_up = 0
 
     def placed(self, event: PduPlaced) -> None:
         """Take a new PDU, which may show that others before it are missing."""
         pdu = event.read.pdu
-        if not self._is_on or pdu.src == self._own_id:
+        if not self._is_on:
             return
         source = self._sources.get(pdu.src)
         if source is None:
@@ -142,13 +146,15 @@ class Asking:
             for src, numbers in self._offered
             if self._sources[src].useful > USEFUL
         ]
-        return min(waited, default=inf) + ALONE_S
+        return max(min(waited, default=inf) + ALONE_S, self._free_at)
 
-    def asked(self, start: float, waiting: Collection[int]) -> None:
+    def asked(self, start: float, waiting: Collection[int], alone_s: float) -> None:
         """Note that the questions returned last are in a burst at `start`.
 
-        Those about the robots `waiting` found no room.
+        Those about the robots `waiting` found no room. `alone_s` is the airtime of a PDU of their
+        own.
         """
+        self._budget.spend(alone_s, start)
         for src, numbers in self._offered:
             if src in waiting:
                 continue
@@ -166,6 +172,13 @@ class Asking:
         self._sources.pop(src, None)
         self._offered = [each for each in self._offered if each[0] != src]
         self.is_offered = bool(self._offered)
+        self._look_ahead()
+
+    def restart(self) -> None:
+        """Go on with another clock; what was missing is forgotten."""
+        self._sources.clear()
+        self._offered, self.is_offered = [], False
+        self._budget.restart()
         self._look_ahead()
 
     def report(self, answers: RepeatReport) -> RepeatReport:
@@ -223,12 +236,14 @@ class Asking:
 
     def _look_ahead(self) -> None:
         self.due_at = self.alone_at = inf
+        self._free_at = self._budget.next_at
         for source in self._sources.values():
             if source.missing:
                 next_at = min(each.next_at for each in source.missing.values())
                 self.due_at = min(self.due_at, next_at)
                 if source.useful > USEFUL:
                     self.alone_at = min(self.alone_at, next_at + ALONE_S)
+        self.alone_at = max(self.alone_at, self._free_at)
 
 
 def _parts(event: PduPlaced) -> set[tuple[int, int]]:

@@ -1,5 +1,7 @@
 """The share of the air for PDUs that are sent again."""
 
+from math import inf
+
 SAVED_S = 0.05
 """Most airtime in s that is saved up."""
 
@@ -12,10 +14,14 @@ class Budget:
         self._saved_s = SAVED_S
         self._at = 0.0
 
+    @property
+    def next_at(self) -> float:
+        """When something may be spent next, by what was spent so far; −inf: at any time."""
+        return -inf if self._saved_s > 0 else self._at - self._saved_s / self._share
+
     def free_at(self, now: float) -> float:
         """When something may be spent, at `now` or later."""
-        self._earn(now)
-        return now if self._saved_s > 0 else now - self._saved_s / self._share
+        return max(now, self.next_at)
 
     def spend(self, airtime_s: float, now: float) -> None:
         """Spend airtime, in s."""

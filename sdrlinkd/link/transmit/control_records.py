@@ -109,11 +109,9 @@ class ControlRecords:
     def due_at(self) -> float:
         """Time from which a PDU with only records may be sent."""
         due_at = min(self._beacons.due_at, self._piggyback.due_at, self._sealing.key_due_at)
-        if not self._n_others:
-            return due_at
         if self._asking.alone_at < inf:
-            due_at = min(due_at, self._alone_from(self._asking.alone_at))
-        return min(due_at, self._clock_alone_at)
+            due_at = min(due_at, self._asking.alone_at)
+        return min(due_at, self._clock_alone_at) if self._n_others else due_at
 
     def is_due(self, start: float) -> bool:
         """Whether a waiting record gets its own PDU at `start`."""
@@ -145,9 +143,8 @@ class ControlRecords:
             self._offer_clock(start)
             cannot_wait = cannot_wait or start >= self._clock_overdue_at
         if self._asking.due_at <= start or self._asking.is_offered:
-            self._piggyback.put_needs(
-                self._asking.questions(start), self._alone_from(self._asking.offered_alone_at)
-            )
+            questions = self._asking.questions(start)
+            self._piggyback.put_needs(questions, self._asking.offered_alone_at)
             self.questions_wait = self._asking.is_offered
             cannot_wait = cannot_wait or self._piggyback.is_overdue(RecordType.NEED, start)
         if self._sealing.is_on:
@@ -164,9 +161,12 @@ class ControlRecords:
         self._clock_told_at = self._clock_offered_at
         return self._clocks.rode()
 
-    def took_questions(self, start: float) -> None:
-        """Note which questions are in the burst just composed, for `start`."""
-        self._asking.asked(start, self._piggyback.asked_nodes())
+    def took_questions(self, start: float, alone_s: float) -> None:
+        """Note which questions are in the burst just composed, for `start`.
+
+        `alone_s` is the airtime of its PDUs that hold only records.
+        """
+        self._asking.asked(start, self._piggyback.asked_nodes(), alone_s)
         self.questions_wait = self._asking.is_offered
 
     def told_alone(self, start: float) -> None:

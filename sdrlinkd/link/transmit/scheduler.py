@@ -150,8 +150,6 @@ class BurstScheduler:
                 self._held = _Held(since, allowance.until, is_settled=True)
             return None
         clock = records.took_clock() if records.clock_waits else None
-        if records.questions_wait:
-            records.took_questions(start)
         if self._held is not _NOT_HELD:
             self._kept_free(start)
         carried = [pdu.carried for pdu in built]
@@ -159,9 +157,12 @@ class BurstScheduler:
             # A burst of only records is for all robots, so use the slowest MCS.
             mcs = rate.lowest
         length_s = airtime_s(mcs, len(built))
+        alone_s = length_s * n_records / len(built)
         if n_records:
-            self._control_airtime_s += length_s * n_records / len(built)
+            self._control_airtime_s += alone_s
             records.told_alone(start)
+        if records.questions_wait:
+            records.took_questions(start, alone_s)
         classes = [pdu.qos for pdu in built]
         self._spend(length_s, classes)
         pdus = [pdu.data for pdu in built]
