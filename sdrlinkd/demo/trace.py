@@ -1,6 +1,6 @@
 """Records of messages sent and received, and the paper's figures of merit."""
 
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -58,23 +58,24 @@ class Trace:
     def matches(self) -> tuple[dict[str, list[Pair]], int]:
         """((sent, received) pairs by topic, number of received messages that nobody sent).
 
-        Messages of a topic keep their order, so each received message is searched after the last
-        match.
+        Of several with the same bytes, the first one sent was received first. Pairs are in the
+        order of sending, as repeated PDUs may bring a message after newer ones.
         """
         pairs: dict[str, list[Pair]] = {}
         foreign = 0
         for name, received in self.received.items():
-            sent = self.sent.get(name, [])
+            waiting: defaultdict[bytes, deque[Sample]] = defaultdict(deque)
+            for sample in self.sent.get(name, []):
+                waiting[sample.payload].append(sample)
             found: list[Pair] = []
-            at = 0
             for sample in received:
-                match = _next_match(sent, at, sample)
-                if match is None:
-                    foreign += 1
+                same = waiting[sample.payload]
+                if same and same[0].at <= sample.at:
+                    sent = same.popleft()
+                    found.append((sent, _as_on_air(sent, sample)))
                 else:
-                    found.append((sent[match], _as_on_air(sent[match], sample)))
-                    at = match + 1
-            pairs[name] = found
+                    foreign += 1
+            pairs[name] = sorted(found, key=lambda pair: pair[0].at)
         return pairs, foreign
 
     def all_pairs(self) -> list[Pair]:
@@ -133,13 +134,3 @@ def _as_on_air(sent: Sample, received: Sample) -> Sample:
     if received.age_s is None:
         return received
     return Sample(sent.at + received.age_s, received.payload)
-
-
-def _next_match(sent: Sequence[Sample], at: int, received: Sample) -> int | None:
-    """Index, from `at` on, of the first sent message with the same bytes that was sent earlier."""
-    for i in range(at, len(sent)):
-        if sent[i].at > received.at:
-            return None
-        if sent[i].payload == received.payload:
-            return i
-    return None

@@ -64,6 +64,7 @@ RX_REASONS = {
     "rx_part_lost": "a part of a large message is missing",
     "rx_other_type": "its type has other fields here",
     "rx_denied": "from a robot that may not send this topic (from)",
+    "rx_outdated": "came after a newer one, as its PDU was sent again (late, deadman_s)",
     "rx_unproven": "from a robot that has not proven to be alive",
 }
 

@@ -52,6 +52,9 @@ class TopicPolicy(
     unproven: Literal["drop", "deliver"] = "drop"
     """At a receiver with keys: what happens to messages of robots that have not proven yet that
     they are alive now, so that these may be recordings."""
+    late: Literal["deliver", "drop"] = "deliver"
+    """At the receiver: what happens to a message that comes after a newer one of its source, as a
+    PDU was sent again; drop: always for a topic with `deadman_s`."""
     stamp: bool = True
     """Whether to send each message's age, so that the receiver knows how late it is."""
     period_s: Annotated[float, Meta(ge=0, le=3600)] = 0.0
@@ -78,6 +81,11 @@ class TopicPolicy(
     def kept(self) -> int:
         """Most messages that wait in the queue; 0: no limit but the queue's."""
         return self.depth if self.history == "keep_last" else 0
+
+    @property
+    def drops_late(self) -> bool:
+        """Whether a message that comes after a newer one of its source is dropped."""
+        return self.late == "drop" or self.deadman_s > 0
 
     @property
     def latched(self) -> int:

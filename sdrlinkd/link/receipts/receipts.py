@@ -15,7 +15,7 @@ REASONS = (
     DELIVERED, "rx_expired", "rx_partial_timeout", "rx_partial_superseded", "rx_partial_evicted",
     "rx_partial_memory", "rx_size_cap", "rx_bad_zstd", "rx_inflates", "rx_no_dictionary",
     "rx_bad_cdr", "rx_unknown_topic", "rx_no_age", "rx_part_lost", "rx_other_type",
-    "rx_unproven", "rx_denied",
+    "rx_unproven", "rx_denied", "rx_outdated",
 )  # fmt: skip
 """Reasons by status, from 1 (wire document, section 6.7)."""
 STATUS = {reason: number for number, reason in enumerate(REASONS, 1)}

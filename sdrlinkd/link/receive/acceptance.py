@@ -63,6 +63,14 @@ class Acceptance:
             return self._named.get(topic.name, DEFAULT_POLICY)
         return self._policies.get(topic.base, DEFAULT_POLICY)
 
+    def drops_late(self, topic: HeardTopic) -> bool:
+        """Whether a message of a topic is dropped if it comes after a newer one.
+
+        Where only the last message of a producer is kept, an older one must not take its place.
+        """
+        is_last_kept = topic.about is not None and self.retain(topic).depth == 1
+        return is_last_kept or self.policy_of(topic).drops_late
+
     def retain(self, topic: HeardTopic) -> Retain:
         """How many messages of a topic are kept for consumers that come later."""
         policy = self.policy_of(topic)

@@ -1,13 +1,18 @@
 """What becomes of a whole message: handed over, dropped, or held until its topic is declared."""
 
+from math import inf
+
 from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.delivered import DELIVERED, Delivered
 from sdrlinkd.link.receive.events import Ended, Event
 from sdrlinkd.link.receive.neighbors import Neighbors
 from sdrlinkd.link.receive.rx_ledger import RxLedger
 from sdrlinkd.link.receive.undeclared import UndeclaredMessages, Whole
-from sdrlinkd.link.topics import HeardTopics
+from sdrlinkd.link.topics import HeardTopic, HeardTopics
 from sdrlinkd.wire import FIRST_NUMBER
+
+SAME_TIME_S = 1e-3
+"""Difference in s of two ages that says nothing about the order of messages."""
 
 
 class Completion:
@@ -20,6 +25,8 @@ class Completion:
         self._acceptance = acceptance
         self._ledger = ledger
         self._neighbors = neighbors
+        self._newest_at: dict[tuple[int, int], float] = {}
+        """When the newest message was submitted, by (source, number of the topic)."""
         self.undeclared = UndeclaredMessages()
         """Messages of topics that were not declared yet."""
 
@@ -39,6 +46,7 @@ class Completion:
 
     def forget(self, src: int, now: float, events: list[Event]) -> None:
         """Drop what waits for declarations of a robot that has restarted."""
+        self._newest_at = {key: at for key, at in self._newest_at.items() if key[0] != src}
         for message in self.undeclared.of_source(src):
             self._end(message, "rx_unknown_topic", now, events)
 
@@ -71,6 +79,9 @@ class Completion:
         if refused is not None:
             self._end(message, refused, now, events)
             return
+        if self._is_outdated(message, topic):
+            self._end(message, "rx_outdated", now, events)
+            return
         _answer(message, DELIVERED, now, events)
         tally = self._ledger.tally(src, topic.base)
         tally.deliver(len(payload))
@@ -83,6 +94,15 @@ class Completion:
                 message.ended_at, number, topic,
             )
         )  # fmt: skip
+
+    def _is_outdated(self, message: Whole, topic: HeardTopic) -> bool:
+        """Whether a message comes after a newer one, where that matters."""
+        origin_at, key = message.origin.at, (message.src, message.number)
+        if origin_at is None or not self._acceptance.drops_late(topic):
+            return False
+        newest_at = self._newest_at.get(key, -inf)
+        self._newest_at[key] = max(newest_at, origin_at)
+        return origin_at < newest_at - SAME_TIME_S
 
     def _end(self, message: Whole, reason: str, now: float, events: list[Event]) -> None:
         self.drop(message.src, message.number, reason)

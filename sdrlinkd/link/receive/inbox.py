@@ -95,7 +95,7 @@ class Inbox:
             read = self._reader.read(admitted)
         except PduError as error:
             return self._drop(error.reason, events)
-        pdu, control, _, is_relayed = read
+        pdu, control, _, is_relayed, _ = read
         stamps = read.stamps
         if not admitted.was_seen and (pdu.src != self._own_id or is_relayed):
             events.append(PduHeard(pdu, stamps, at, is_relayed))

@@ -27,12 +27,17 @@ _NO_CONTROL = ControlEntries([], 0, 0)
 
 
 class PduRead(NamedTuple):
-    """A PDU that could be read. `is_relayed`: others than its source vouch for its times."""
+    """A PDU that could be read.
+
+    `is_relayed`: others than its source vouch for its times, or it was repeated; `is_forwarded`: a
+    relay has sent it.
+    """
 
     pdu: Pdu
     control: ControlEntries
     records: list[Record]
     is_relayed: bool
+    is_forwarded: bool
 
     @property
     def stamps(self) -> list[Stamp]:
@@ -83,13 +88,13 @@ class PduReader:
         records = control.records
         if self._has_numbers:
             pdu, records = numbered(pdu), [with_topic(record) for record in records]
-        is_relayed = pdu.hop < self._hop_limit or admitted.is_held
-        return PduRead(pdu, control, records, is_relayed)
+        is_forwarded = pdu.hop < self._hop_limit
+        return PduRead(pdu, control, records, is_forwarded or admitted.is_held, is_forwarded)
 
     def glance(self, admitted: Admitted) -> list[Event]:
         """The events that follow from the presence of a PDU whose source is not proven."""
         try:
-            pdu, _, records, is_relayed = self.read(admitted)
+            pdu, _, records, is_relayed, _ = self.read(admitted)
         except PduError:
             return []
         events: list[Event] = [PduHeard(pdu, [], admitted.at, is_relayed)]

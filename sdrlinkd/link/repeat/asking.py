@@ -96,7 +96,7 @@ class Asking:
             self._filled(source, event)
         is_useful = event.is_wanted and event.read.control.n_entries < len(pdu.entries)
         source.useful += USEFUL_WEIGHT * (is_useful - source.useful)
-        source.hears_relays = source.hears_relays or event.read.is_relayed
+        source.hears_relays = source.hears_relays or event.read.is_forwarded
         for record in event.read.records:
             if isinstance(record, Parity):
                 source.has_parity.add(record.topic_id)
@@ -248,7 +248,7 @@ class Asking:
 
 def _parts(event: PduPlaced) -> set[tuple[int, int]]:
     """(topic, entry id) of the longer messages of which a PDU holds fragments or parity."""
-    pdu, _, records, _ = event.read
+    pdu, records = event.read.pdu, event.read.records
     found = {
         (entry.topic_id, entry.entry_id)
         for entry in pdu.entries
