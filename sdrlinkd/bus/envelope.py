@@ -56,6 +56,7 @@ class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
     """What became of a message at robot `d` (bus document, 4.4).
 
     `took` is the message's age there in s; `left` is the number of robots that have not answered.
+    `repeats` counts the PDUs with parts of the message that were sent again.
     """
 
     id: str
@@ -65,6 +66,7 @@ class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
     reason: str = ""
     took: float | None = None
     left: int = 0
+    repeats: int = 0
 
 
 class Taken(msgspec.Struct, frozen=True):

@@ -132,7 +132,8 @@ def _show_receipts(
         robot = "everyone" if told.dst == BROADCAST else f"robot {told.dst}"
         reason = f" ({told.reason})" if told.reason else ""
         took = "" if told.took_s is None else f", {1e3 * told.took_s:.2f} ms old"
-        typer.echo(f"message {waiting[told.id]}, {robot}: {told.fate}{reason}{took}")
+        again = f", {told.repeats} PDUs sent again" if told.repeats else ""
+        typer.echo(f"message {waiting[told.id]}, {robot}: {told.fate}{reason}{took}{again}")
         if not told.left:
             del waiting[told.id]
     return fates

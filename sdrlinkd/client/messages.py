@@ -71,7 +71,8 @@ class Receipt:
     `dst` is 255 if the message was sent to everyone and no robot was heard that could answer.
     `reason` is one of the ledger's, or `daemon_gone` if the fate is unknown because our own daemon
     restarted or does not answer. `took_s` is the message's age in s at its delivery. `left` is the
-    number of robots that have not answered yet.
+    number of robots that have not answered yet, and `repeats` counts the PDUs with parts of it that
+    were sent again.
     """
 
     id: str
@@ -81,6 +82,7 @@ class Receipt:
     reason: str = ""
     took_s: float | None = None
     left: int = 0
+    repeats: int = 0
 
 
 def decode_receipt(frames: Sequence[bytes]) -> Receipt | None:
@@ -96,6 +98,7 @@ def decode_receipt(frames: Sequence[bytes]) -> Receipt | None:
         reason=fields.get("reason", ""),
         took_s=fields.get("took"),
         left=fields.get("left", 0),
+        repeats=fields.get("repeats", 0),
     )
 
 

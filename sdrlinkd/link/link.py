@@ -75,6 +75,7 @@ from sdrlinkd.wire import (
     Need,
     Receipt,
     Registry,
+    Repeat,
     Topic,
     Waits,
     Wanted,
@@ -420,9 +421,7 @@ class Link:
         self._control_records.tell_topics(now, scheduler.record_pdu_s)
         self._tell_dropped()
         self._receipts.expire(now)
-        self._why.sample(
-            now, (each.id for each in self._topics), scheduler, self._reception.heard_s
-        )
+        self._why.sample(now, (each.id for each in self._topics), self._air_use)
         self._reporter.sample(now, scheduler)
 
     @property
@@ -478,7 +477,8 @@ class Link:
 
     @property
     def _air_use(self) -> AirUse:
-        return AirUse(self._scheduler.report(), self._reception.heard_s)
+        repeats = self._answers.report()
+        return AirUse(self._scheduler.report(), self._reception.heard_s, repeats)
 
     def _dispatch(self, events: list[Event]) -> list[Delivered]:
         """Handle the inbox's events in order; returns the messages to hand over."""
@@ -518,6 +518,9 @@ class Link:
             self._reception.take_waits(src, record)
         elif isinstance(record, Wanted):
             self._demand.hear(src, record, at)
+        elif isinstance(record, Repeat):
+            if src != self.own_id:
+                self._answers.others_repeat(record, self._scheduler.record_pdu_s, at)
         elif isinstance(record, Need):
             self._asking.others_need(record, at)
             n_others = len(self._reception.neighbors.present(at))

@@ -24,6 +24,8 @@ class Setting(NamedTuple):
     host_s: float
     has_numbers: bool = False
     """Whether messages that are too large for 255 fragments go in parts (the key `auto`)."""
+    repeats: float = 0.0
+    """Share of airtime that is left for repeats."""
     notes: tuple[str, ...] = ()
     """What a person should know about the assumptions of the plan, in sentences."""
 

@@ -91,11 +91,12 @@ def make_plan(
     classes = [
         ClassPlan(qos.label, sum(t.air for t in topics if t.qos == qos.label)) for qos in Qos
     ]
-    is_carried = _is_carried(topics, asked)
+    is_carried = _is_carried(topics, asked, setting)
 
     def carries(changed: Sequence[Load]) -> bool:
         pairs = zip(changed, known, strict=True)
-        return _is_carried(*_judged([(load, policy) for load, (_, policy) in pairs], setting))
+        judged = _judged([(load, policy) for load, (_, policy) in pairs], setting)
+        return _is_carried(*judged, setting)
 
     advice = _late(topics) if is_carried else [slower([each for each, _ in known], asked, carries)]
     settled = setting.settled
@@ -124,8 +125,9 @@ def _judged(
     return topics, [topic.air * (1 + supply.others) / supply.share for topic in topics]
 
 
-def _is_carried(topics: Sequence[TopicPlan], asked: Sequence[float]) -> bool:
-    return sum(asked) <= FULL and not any(topic.worst_s == FOREVER for topic in topics)
+def _is_carried(topics: Sequence[TopicPlan], asked: Sequence[float], setting: Setting) -> bool:
+    full = min(FULL, 1 - setting.repeats)
+    return sum(asked) <= full and not any(topic.worst_s == FOREVER for topic in topics)
 
 
 def _backlog_s(known: Sequence[tuple[Load, TopicPolicy]], setting: Setting) -> float:

@@ -53,7 +53,7 @@ def setting_of(
     longest_s = radio.traits.longest_burst_s[modem.mcs]
     return Setting(
         radio.airtimes, config.inner_pdu_size, modem.mcs, longest_s, config.classes, n, settled,
-        radio.traits, host_s, has_numbers, tuple(notes),
+        radio.traits, host_s, has_numbers, config.repeat.share, tuple(notes),
     )  # fmt: skip
 
 
@@ -72,6 +72,11 @@ def _notes(
         notes.append(
             f"without an access policy, simultaneous bursts of {n} robots collide on a shared "
             f"channel; this plan ignores that (alone, each can use up to {percent(settled.share)})"
+        )
+    if config.repeat.share:
+        notes.append(
+            f"PDUs that are lost are sent again, later than this; {percent(config.repeat.share)} of "
+            "the air is left for that (repeat.share)"
         )
     if settled.policy == "csma":
         notes.append(

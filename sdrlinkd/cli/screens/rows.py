@@ -27,7 +27,7 @@ def robots_table(reports: Sequence[NeighborReport], *, rule: bool) -> FittedTabl
         (
             words("robot"), figure("heard"), figure("SNR dB"), figure("there"), figure("PER %"),
             figure("there"), figure("MCS", 2), figure("PDUs", 4), figure("lost", 3),
-            figure("ever %", 5), figure("twice", 6), words("registry", 1, 8),
+            figure("repaired", 7), figure("ever %", 5), figure("twice", 6), words("registry", 1, 8),
         ),
         rule=rule,
     )  # fmt: skip
@@ -42,6 +42,7 @@ def robots_table(reports: Sequence[NeighborReport], *, rule: bool) -> FittedTabl
             str(each.mcs),
             str(each.pdus_heard),
             str(each.pdus_lost),
+            str(each.pdus_repaired),
             percent(each.per, 2),
             str(each.duplicates),
             Text(each.registry, style="bold red" if each.registry == "differs" else ""),

@@ -93,6 +93,8 @@ def head(snapshot: Snapshot, width: int) -> list[Text]:
     air = f"sent {link.air_sent_pct:.1f} %, heard {link.air_heard_pct:.1f} %"
     air += f"; {link.access}" if link.access != "none" else ""
     air += f"; PDUs of {link.pdu_size} B"
+    if link.repeats.pdus:
+        air += f"; {link.repeats.pdus} PDUs sent again"
     if link.bursts_late:
         air += f"; {link.bursts_late} late bursts resent"
     tx, rx = link.tx, link.rx

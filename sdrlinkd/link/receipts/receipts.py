@@ -26,7 +26,8 @@ class Verdict(NamedTuple):
     """What became of a message at robot `dst`: `fate` is delivered, expired, dropped or unknown.
 
     `took_s` is the message's age in s at its delivery, None if unknown. `left` is the number of
-    robots that have not answered yet.
+    robots that have not answered yet, and `repeats` counts the PDUs with parts of it that were sent
+    again.
     """
 
     receipt: str
@@ -36,6 +37,7 @@ class Verdict(NamedTuple):
     reason: str = ""
     took_s: float | None = None
     left: int = 0
+    repeats: int = 0
 
 
 @dataclass(slots=True)
@@ -147,13 +149,29 @@ class Receipts:
         elif reason in EXPIRED:
             fate = "expired"
         self._verdicts.append(
-            Verdict(message.receipt, message.topic_id, dst, fate, reason, age_s, left)
+            Verdict(
+                message.receipt,
+                message.topic_id,
+                dst,
+                fate,
+                reason,
+                age_s,
+                left,
+                message.n_repeats,
+            )
         )
 
     def _give_up(self, pending: _Pending) -> None:
         message = pending.message
         self._verdicts += [
-            Verdict(message.receipt, message.topic_id, dst, "unknown", left=left)
+            Verdict(
+                message.receipt,
+                message.topic_id,
+                dst,
+                "unknown",
+                left=left,
+                repeats=message.n_repeats,
+            )
             for left, dst in _counted_down(pending.awaited)
         ]
 

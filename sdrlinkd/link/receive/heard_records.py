@@ -17,13 +17,12 @@ from sdrlinkd.wire import (
     Receipt,
     Record,
     RegistryDigest,
-    Repeat,
     Stamp,
     TopicPiece,
     Wanted,
 )
 
-_ELSEWHERE = (Parity, Stamp, Contact, KeyTold, Repeat)
+_ELSEWHERE = (Parity, Stamp, Contact, KeyTold)
 """Records that others take: the inbox, and sealing."""
 
 

@@ -157,6 +157,10 @@ class Answers:
                 known = self.wanted[key] = _Wanted(kept, at + UNION_S * for_all)
             known.askers.add(asker)
 
+    def others_repeat(self, repeat: Repeat, pdu_s: float, at: float) -> None:
+        """Take what another robot repeats, in PDUs of `pdu_s`: all robots share the airtime."""
+        self._budget.spend((1 + repeat.n_pdus) * pdu_s, at)
+
     def heard(self, src: int, number: int) -> None:
         """Note that another robot has sent a PDU that we might repeat."""
         self.wanted.pop((src, number), None)

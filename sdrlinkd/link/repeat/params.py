@@ -10,5 +10,5 @@ class RepeatParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """How PDUs that a robot lacks are asked for, and sent again."""
 
     share: Annotated[float, Meta(ge=0, le=0.5)] = 0.05
-    """Share of airtime for PDUs that are sent again because others lack them; 0: none are sent
-    again, and none are asked for."""
+    """Share of airtime for PDUs that are sent again because others lack them, all robots together;
+    0: none are sent again, and none are asked for."""

@@ -8,7 +8,8 @@ from sdrlinkd.link.access import idle_words
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import TX_REASONS, Intake, Outbox, TopicPolicy
 from sdrlinkd.link.status.meters import RateMeter
-from sdrlinkd.link.transmit import BurstScheduler, NoRadio, TransmitReport
+from sdrlinkd.link.transmit import TransmitReport
+from sdrlinkd.reports import RepeatReport
 from sdrlinkd.wire import BROADCAST
 
 MINUTE_S = 60.0
@@ -30,10 +31,14 @@ class Told(NamedTuple):
 
 
 class AirUse(NamedTuple):
-    """Use of the channel since the start: our report, and the airtime of others' bursts in s."""
+    """Use of the channel since the start: our report, and the airtime of others' bursts in s.
+
+    `repeats` is our report on what was sent again.
+    """
 
     sent: TransmitReport
     heard_s: float
+    repeats: RepeatReport = RepeatReport()
 
 
 class Why:
@@ -45,17 +50,13 @@ class Why:
         self._began_at = float("inf")
         self._meter = RateMeter(MINUTE_S, STEP_S)
 
-    def sample(
-        self, now: float, topics: Iterable[int], scheduler: BurstScheduler | NoRadio, heard_s: float
-    ) -> None:
+    def sample(self, now: float, topics: Iterable[int], air: AirUse) -> None:
         """Sample all counters at `now`, if the last sample is some seconds old.
 
-        `topics` are the ids of all topics, and `heard_s` is the airtime of others' bursts so far,
-        in s.
+        `topics` are the ids of all topics.
         """
         self._began_at = min(self._began_at, now)
         if self._meter.is_due(now):
-            air = AirUse(scheduler.report(), heard_s)
             self._meter.sample(self._counters(topics, air), now)
 
     def explain(self, topic_id: int, name: str, told: Told, now: float, air: AirUse) -> list[str]:
@@ -85,7 +86,7 @@ class Why:
         if short or waiting:
             lines.append(self._air(self._intake.treatment(topic_id)[0], now, air))
             lines += self._idle(now, air)
-        return lines
+        return [*lines, *self._again(now, air)]
 
     def _treatment(self, name: str, policy: TopicPolicy, told: Told, topic_id: int) -> str:
         dst = self._intake.destination(topic_id)
@@ -162,6 +163,18 @@ class Why:
             words = f"the channel was {'full' if busy > FULL else f'{100 * busy:.0f} % busy'}"
         return [f"{words} (ours {100 * min(1.0, sent):.0f} %, others' {100 * heard:.0f} %)"]
 
+    def _again(self, now: float, air: AirUse) -> list[str]:
+        """A sentence on the PDUs that were sent again, if there were any."""
+        pdus = self._lately(("repeats", "pdus"), air.repeats.pdus, now)
+        over_s = min(MINUTE_S, now - self._began_at)
+        if not pdus or over_s <= 0:
+            return []
+        used = self._lately(("repeats", "air"), round(1e6 * air.repeats.airtime_s), now)
+        share = 1e-4 * used / over_s
+        return [
+            f"{pdus} PDUs of all topics were lost and sent again, with {share:.2g} % of the air"
+        ]
+
     def _lately(self, key: Hashable, value: int, now: float) -> int:
         return self._meter.grown(key, value, now)
 
@@ -171,6 +184,8 @@ class Why:
         }
         for each, used_s in _both(air).items():
             counters["air", each] = round(1e6 * used_s)
+        counters["repeats", "pdus"] = air.repeats.pdus
+        counters["repeats", "air"] = round(1e6 * air.repeats.airtime_s)
         for topic_id in topics:
             tally = self._intake.tally(topic_id)
             counters["accepted", topic_id] = tally.accepted
