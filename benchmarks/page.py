@@ -34,6 +34,13 @@ TEXTS = {
         "CPU time of one PDU, sealed at one robot and opened at another, beside the cipher alone; "
         "and of one message through both links, sealed beside in the clear."
     ),
+    "repeats": (
+        "Two links in virtual time on an air that loses PDUs, QPSK 1/2 at 1 Msps: 100 messages of "
+        "100 B a second, or images. *block_code_16_n*: n - 16 packets of a code after each 16 "
+        "messages, as in wfb-ng, with at least the airtime of our repeats. *nak_rfc3208*: negative "
+        "acknowledgments with the times of OpenPGM's examples; it shares the air without beacons "
+        "or clocks. Losses in bursts last 50 ms on average."
+    ),
     "modem_path": (
         "The first two rows are wall time through one daemon, its modem and a paced loopback. "
         "The others are CPU time of one core: how many times faster than the samples come."

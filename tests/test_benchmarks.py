@@ -43,6 +43,13 @@ ROWS = {
         *(f"goodput_kept_{size}B_pct" for size in (64, 1024)),
         "overhead_octets",
     },
+    "repeats": {
+        "delivered_in_0.3s_5pct_bursts_pct",
+        "delivered_in_1s_20pct_bursts_pct",
+        "delivered_in_0.3s_5pct_random_pct",
+        "images_delivered_2pct_random_pct",
+        "urgent_lost_twice_pct",
+    },
     "modem_path": {
         "odom_30hz_latency_ms_p50",
         "odom_30hz_latency_ms_p99",

@@ -23,6 +23,9 @@ BENCHMARKS: dict[str, Benchmark] = {
     "sealing": Benchmark(
         "Sealed PDUs: processor time, latency and octets.", 0.5, peers=("cryptography",)
     ),
+    "repeats": Benchmark(
+        "Messages over an air that loses PDUs: with repeats, and as others do it.", 3,
+    ),
     "modem_path": Benchmark("The modem in a daemon: latency, and speed relative to real time.", 2),
     "realtime": Benchmark("Whole daemons in real time: latency, ages, load and start.", 8),
     "waterfall": Benchmark("Where a message's time goes in a daemon, stage by stage.", 1),

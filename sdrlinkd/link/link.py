@@ -160,6 +160,7 @@ class Link:
             params, reassembly, registry, self._heard_topics, own_id, relay, Inflated(dictionaries),
             max_expanded, hears_self, self.sealing, clear_size,
         )  # fmt: skip
+        self._own_bursts = self._reception.own_pdus.bursts
         self._receipts = Receipts(own_id, params.receipt_s)
         beacons = Beacons(params.beacon_s if has_control else 0.0, params.pdu_size, digest, rng)
         clock = clock if has_control else NO_CLOCK
@@ -182,7 +183,7 @@ class Link:
         self._reporter = Reporter(
             self._topics, self._heard_topics, digest, self._outbox, self._intake,
             self._composer, self._control_records, self._tx_delays, self._reception, self._receipts,
-            self._clocks, self.sealing, self._asking, self._answers, clear_size,
+            self._clocks, self.sealing, self._asking, self._answers, own_id, clear_size,
         )  # fmt: skip
 
     # The radio.
@@ -220,6 +221,8 @@ class Link:
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next; None: nothing to send, or not yet."""
         burst = self._scheduler.next_burst(opportunity)
+        if burst is not None:
+            self._own_bursts.append(burst.pdus)
         if burst is not None and self._composer.asking:
             self._expect_receipts(burst.start)
             self._tell_dropped()

@@ -55,8 +55,9 @@ class Reporter:
         digest: RegistryDigest, outbox: Outbox, intake: Intake, composer: Composer,
         control_records: ControlRecords, tx_delays: TxDelayMeters, reception: Reception,
         receipts: Receipts, clocks: Clocks, sealing: Sealing | InTheClear, asking: Asking,
-        answers: Answers, pdu_size: int,
+        answers: Answers, own_id: int, pdu_size: int,
     ) -> None:  # fmt: skip
+        self._own_id = own_id
         self._asking = asking
         self._answers = answers
         self._sealing = sealing
@@ -140,6 +141,11 @@ class Reporter:
         notices += self._never_met(scheduler.least_s) + scheduler.access_notices(now)
         notices += self._heard_topics.notices()
         notices += self._sealing.notices(now)
+        if self._reception.own_pdus.has_double(now):
+            notices.append(
+                f"another robot sends with our id {self._own_id}, or somebody plays what we sent: "
+                "give each robot an id of its own (robot_id)"
+            )
         return notices + self._neighbors.disagreements(self._registry, self._digest)
 
     def _never_met(self, least_s: float) -> list[str]:

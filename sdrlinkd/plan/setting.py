@@ -75,8 +75,8 @@ def _notes(
         )
     if config.repeat.share:
         notes.append(
-            f"PDUs that are lost are sent again, later than this; {percent(config.repeat.share)} of "
-            "the air is left for that (repeat.share)"
+            "PDUs that are lost are sent again, later than this; "
+            f"{percent(config.repeat.share)} of the air is left for that (repeat.share)"
         )
     if settled.policy == "csma":
         notes.append(

@@ -306,3 +306,10 @@ def test_nothing_comes_twice_and_no_age_is_too_low(seed, loss, size, is_relayed)
     for _, _, age_s, told_s in air.got:
         assert told_s is None or told_s > age_s - 3e-3
     assert not [line for link in air.links.values() for line in link.audit()]
+
+
+def test_what_was_lost_before_a_number_was_told_is_asked_for_too():
+    air = Air(lost=once(3, 5), beacon_s=0.0)
+    air.flow(1, 40, size=90)
+    air.run(air.now + 0.5)
+    assert sorted(air.numbers(2)) == list(range(40))

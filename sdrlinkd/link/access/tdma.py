@@ -7,6 +7,7 @@ from random import Random
 from struct import pack
 
 from sdrlinkd.link.access.base import BusyChannel, Slot, Wish, next_on_grid
+from sdrlinkd.link.access.phase import Phase
 from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma_states import STEPS, Happens, State
@@ -80,6 +81,7 @@ class Tdma(BusyChannel):
         times = (round(1e6 * slot_s), round(1e6 * guard_s), round(1e6 * minislot_s) * reuse)
         self._times_crc = crc16(pack(">III", *times) + bytes(nodes))
         self._origin = 0.0
+        self._phase = Phase(self._frame_s, guard_s)
         self._root, self._level, self._parent = own_id, 0, own_id
         self._lost = (-1, 0, 0.0)
         """The lost root, as (root, our level then, time until which it is not accepted)."""
@@ -122,7 +124,8 @@ class Tdma(BusyChannel):
             if earliest < self._begins_at and not self._is_first(earliest, sensed):
                 return None
             self._go(Happens.BEGINS)
-            self._origin = self._followed_at = earliest
+            self._begin(earliest)
+            self._followed_at = earliest
         self._forget(earliest)
         number = math.floor((earliest - self._origin) / self._slot_s)
         for each in (number, number + 1):
@@ -186,10 +189,11 @@ class Tdma(BusyChannel):
             # They will follow us; until then we adopt their phase.
             if self.role is State.LISTENING:
                 self._go(Happens.ADOPTS)
-                self._origin, self._followed_at = origin, at
+                self._begin(origin)
+                self._followed_at = at
             elif self._is_alone(at):
                 self._go(Happens.ADOPTS)
-                self._origin = origin
+                self._begin(origin)
         elif frame.root == self._lost[0] and told[1] > self._lost[1] and at < self._lost[2]:
             # This robot has not noticed yet that the root is lost.
             return
@@ -218,6 +222,11 @@ class Tdma(BusyChannel):
             for src in self._strangers.lately(now)
         ]
         return outside + without + differing
+
+    def _begin(self, origin: float) -> None:
+        """Keep a schedule of our own whose frames start at `origin`."""
+        self._origin = origin
+        self._phase.keep(origin)
 
     def _go(self, happens: Happens) -> None:
         self.role = after(STEPS, self.role, happens)

@@ -63,6 +63,10 @@ class Acceptance:
             return self._named.get(topic.name, DEFAULT_POLICY)
         return self._policies.get(topic.base, DEFAULT_POLICY)
 
+    def commands(self, topic: HeardTopic | None) -> bool:
+        """Whether messages of a topic are commands, whose absence stops a robot."""
+        return topic is not None and self.policy_of(topic).deadman_s > 0
+
     def drops_late(self, topic: HeardTopic) -> bool:
         """Whether a message of a topic is dropped if it comes after a newer one.
 

@@ -1,6 +1,7 @@
 """The duplicate filter, which also counts lost PDUs."""
 
 from collections import deque
+from collections.abc import Sequence
 from math import inf
 
 from sdrlinkd.wire import PDU_NUMBERS, nearest_number
@@ -10,6 +11,7 @@ KEEP_S = 1.0
 """Time in s for which a PDU is known again; repeated ones come up to this late."""
 REORDERED = 64
 """How far behind the newest one a PDU may be that was sent before the first one heard."""
+NOTHING: Sequence[int] = range(0)
 MOST_PER_S = 20_000
 """More PDUs than any source sends in a second."""
 
@@ -39,8 +41,8 @@ class SequenceTrack:
         """Whether the source has told a number."""
         self.number = -1
         """Number of the PDU heard last."""
-        self.skipped = 0
-        """How many numbers before it were skipped."""
+        self.skipped: Sequence[int] = NOTHING
+        """The numbers of which it showed that they are missing."""
         self.fills = False
         """Whether it was missing before."""
         self.restarts = 0
@@ -73,7 +75,7 @@ class SequenceTrack:
         `told`: its PDU number, if that was told. In place of its CRC, a sealed PDU has its T, which
         no other PDU with its sequence number has.
         """
-        self.skipped, self.fills = 0, False
+        self.skipped, self.fills = NOTHING, False
         if self._order:
             self._forget(at)
             reach = inf if is_sealed else WINDOW if told is None else 0
@@ -88,7 +90,8 @@ class SequenceTrack:
             number = self._aligned(number, told, at)
         step = number - self.newest
         if step > 0:
-            self.skipped = step - 1
+            if not self.skipped:
+                self.skipped = range(self.newest + 1, number)
             if self._doubtful and told is not None:
                 # It is the life of before, so what was skipped is lost.
                 self._doubtful = 0
@@ -156,7 +159,10 @@ class SequenceTrack:
         if not self.is_numbered:
             self._shift(nearest_number(told, number & 0xFF) - number)
             self.is_numbered, self._told_at = True, at
-            return nearest_number(told, number & 0xFF)
+            number = nearest_number(told, number & 0xFF)
+            lowest = max(min(self._seen), number - WINDOW)
+            self.skipped = [each for each in range(lowest, number) if each not in self._seen]
+            return number
         off = (told - self.newest + PDU_NUMBERS // 2) % PDU_NUMBERS - PDU_NUMBERS // 2
         believed = self.newest + off
         if not -MOST_PER_S * KEEP_S < off <= 256 + MOST_PER_S * (at - self._told_at):

@@ -1,5 +1,6 @@
 """Events that a received PDU causes in the link, besides complete messages."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from sdrlinkd.link.receive.delivered import Delivered
@@ -53,13 +54,13 @@ class Ended(NamedTuple):
 class PduPlaced(NamedTuple):
     """A PDU that was not heard before, and its number among those of its source.
 
-    It came at `at`, and `n_skipped` numbers before it were skipped. `is_wanted`: it is for this
+    It came at `at`, and showed that the numbers `skipped` are missing. `is_wanted`: it is for this
     robot, or to be relayed.
     """
 
     read: "PduRead"
     number: int
-    n_skipped: int
+    skipped: Sequence[int]
     is_wanted: bool
     at: float
 

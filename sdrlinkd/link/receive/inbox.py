@@ -14,6 +14,7 @@ from sdrlinkd.link.receive.events import Ended, Event, Newcomer, PduHeard, PduPl
 from sdrlinkd.link.receive.heard_records import HeardRecords
 from sdrlinkd.link.receive.neighbors import Neighbor, Neighbors
 from sdrlinkd.link.receive.pdu_read import PduRead, PduReader
+from sdrlinkd.link.receive.recorded import OwnPdus, RecentCommands
 from sdrlinkd.link.receive.relay import Relay
 from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import Held, RxLedger
@@ -25,6 +26,7 @@ from sdrlinkd.wire import (
     PARTS,
     PDU_NUMBERS,
     Beacon,
+    Clock,
     Entry,
     Parity,
     Pdu,
@@ -62,8 +64,10 @@ class Inbox:
         topics: HeardTopics,
         completion: Completion,
         repeated: RepeatedPdus,
+        own_pdus: OwnPdus,
         clear_size: int,
     ) -> None:
+        self._own_pdus = own_pdus
         self._reader = PduReader(
             params, clear_size, has_control=registry.has_control, has_numbers=topics.has_numbers
         )
@@ -83,6 +87,7 @@ class Inbox:
         self._reassembly = Reassembly(limits)
         self._ages = Ages(reassembly.timeout_s)
         self._ledger = ledger
+        self._commands = RecentCommands(acceptance, topics)
 
     def hear(self, admitted: Admitted, now: float) -> list[Event]:
         """Take a PDU and return the events that follow from it."""
@@ -100,6 +105,7 @@ class Inbox:
         if not admitted.was_seen and (pdu.src != self._own_id or is_relayed):
             events.append(PduHeard(pdu, stamps, at, is_relayed))
         if pdu.src == self._own_id and not self._hears_self:
+            self._own_pdus.heard(admitted.raw, at)
             return self._drop("rx_own", events)
         neighbor = self._neighbors.get(pdu.src)
         if neighbor is None:
@@ -111,6 +117,8 @@ class Inbox:
         told = read.told if admitted.number is None else admitted.number
         if not track.heard(*key[1:], at, told, is_sealed=key[0]):
             neighbor.count_duplicate()
+            return self._drop("rx_dup", events)
+        if admitted.ticks is None and self._commands.has_heard(pdu, admitted.raw, at):
             return self._drop("rx_dup", events)
         neighbor.count_new(pdu.hop, is_repaired=track.fills and admitted.number is not None)
         if track.fills and not is_relayed and track.is_numbered:
@@ -137,8 +145,8 @@ class Inbox:
         if not is_ours:
             return self._drop("rx_not_for_us", events)
         for record in records:
-            if isinstance(record, Beacon):
-                self._take_beacon(record, neighbor, read, key, at, now, events)
+            if isinstance(record, Beacon | Clock):
+                self._take_boot_id(record.boot_id, neighbor, read, key, at, now, events)
             elif isinstance(record, Repeat) and not is_relayed and record.node == pdu.src:
                 self._ledger.skip_records(not self._repeated.take(record, at))
         self._records.take(pdu, admitted, neighbor, records, is_relayed, now, events)
@@ -180,12 +188,13 @@ class Inbox:
         self._ages.expire(now, self._reassembly.holds)
         return events
 
-    def _take_beacon(
-        self, beacon: Beacon, neighbor: Neighbor, read: PduRead, key: tuple[bool, int, int],
+    def _take_boot_id(
+        self, boot_id: int, neighbor: Neighbor, read: PduRead, key: tuple[bool, int, int],
         at: float, now: float, events: list[Event],
     ) -> None:  # fmt: skip
-        if not neighbor.take_beacon(beacon):
-            neighbor.track.goes_on()
+        if not neighbor.take_boot_id(boot_id, is_proven=key[0]):
+            if boot_id == neighbor.boot_id:
+                neighbor.track.goes_on()
             return
         neighbor.track.restart(*key[1:], at, read.told)
         self._forget(neighbor.src, now, events)

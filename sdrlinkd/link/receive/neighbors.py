@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from sdrlinkd.link.receive.duplicates import SequenceTrack
 from sdrlinkd.reports import NeighborReport
-from sdrlinkd.wire import Beacon, Registry, RegistryDigest
+from sdrlinkd.wire import Registry, RegistryDigest
 
 # Weight of the newest PDU in the mean SNR.
 SNR_WEIGHT = 0.2
@@ -33,6 +33,7 @@ class Neighbor:
     snr_db: float | None = None
     mean_snr_db: float | None = None
     boot_id: int | None = None
+    _strange_boot_id: int | None = None
     reboots: int = 0
     digest: RegistryDigest | None = None
     _reported: tuple[int, int] = (0, 0)
@@ -77,12 +78,20 @@ class Neighbor:
         self._reported = (first_heard, missed)
         return self.mean_snr_db, lost / (heard + lost)
 
-    def take_beacon(self, beacon: Beacon) -> bool:
-        """Note a beacon of the robot; True if it has restarted since its last beacon."""
-        rebooted = self.boot_id not in (None, beacon.boot_id)
-        self.boot_id = beacon.boot_id
-        self.reboots += rebooted
-        return rebooted
+    def take_boot_id(self, boot_id: int, *, is_proven: bool) -> bool:
+        """Note the boot id in a record of the robot; True if it has restarted.
+
+        In the clear, anybody can tell another boot id, so it counts when it comes a second time.
+        """
+        if self.boot_id is None or boot_id == self.boot_id:
+            self.boot_id, self._strange_boot_id = boot_id, None
+            return False
+        if not is_proven and boot_id != self._strange_boot_id:
+            self._strange_boot_id = boot_id
+            return False
+        self.boot_id, self._strange_boot_id = boot_id, None
+        self.reboots += 1
+        return True
 
     def take_digest(self, digest: RegistryDigest) -> None:
         """Note the digest of the robot's registry."""

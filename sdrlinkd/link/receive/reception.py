@@ -13,6 +13,7 @@ from sdrlinkd.link.receive.events import Event
 from sdrlinkd.link.receive.handover import AgeReport, Handover
 from sdrlinkd.link.receive.inbox import Inbox
 from sdrlinkd.link.receive.neighbors import Neighbors
+from sdrlinkd.link.receive.recorded import OwnPdus
 from sdrlinkd.link.receive.relay import Relay, RelayParams
 from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import RxLedger
@@ -52,12 +53,15 @@ class Reception:
             registry, inflated, max_expanded, sealing.opener.delivers_unproven, sealing.is_on
         )
         self._ledger = RxLedger(topics)
+        self.own_pdus = OwnPdus()
+        """What this robot sent lately."""
         repeated = RepeatedPdus()
         self._door = Door(sealing, self._acceptance, self._ledger, self.neighbors, repeated)
         completion = Completion(topics, self._acceptance, self._ledger, self.neighbors)
         self._inbox = Inbox(
             params, reassembly, registry, own_id, hears_self, self.neighbors, self._relay,
-            self._acceptance, self._ledger, topics, completion, repeated, clear_size,
+            self._acceptance, self._ledger, topics, completion, repeated,
+            self.own_pdus, clear_size,
         )  # fmt: skip
         self._handover = Handover()
         self._air = AirHeard()

@@ -104,7 +104,8 @@ class Asking:
         if before is not None and event.number < before.number:
             return
         source.last = event
-        if event.n_skipped and before is not None and (event.is_wanted or before.is_wanted):
+        is_wanted = event.is_wanted or (before is not None and before.is_wanted)
+        if event.skipped and is_wanted:
             self._skipped(source, before, event)
 
     def others_need(self, need: Need, at: float) -> None:
@@ -193,11 +194,10 @@ class Asking:
                 source.answer_s += WEIGHT * (answer_s - source.answer_s)
             self._look_ahead()
 
-    def _skipped(self, source: _Source, before: PduPlaced, event: PduPlaced) -> None:
+    def _skipped(self, source: _Source, before: PduPlaced | None, event: PduPlaced) -> None:
         patience_s = RELAYED_PATIENCE_S if source.hears_relays else PATIENCE_S
-        inside = frozenset(_parts(before) & _parts(event))
-        first = max(event.number - event.n_skipped, event.number - MOST_MISSING)
-        for number in range(first, event.number):
+        inside = frozenset(_parts(before) & _parts(event)) if before is not None else frozenset()
+        for number in event.skipped[-MOST_MISSING:]:
             source.missing[number % PDU_NUMBERS] = _Missing(event.at, event.at + patience_s, inside)
         while len(source.missing) > MOST_MISSING:
             del source.missing[next(iter(source.missing))]

@@ -171,9 +171,7 @@ class Why:
             return []
         used = self._lately(("repeats", "air"), round(1e6 * air.repeats.airtime_s), now)
         share = 1e-4 * used / over_s
-        return [
-            f"{pdus} PDUs of all topics were lost and sent again, with {share:.2g} % of the air"
-        ]
+        return [f"{pdus} PDUs of all topics were lost and sent again, in {share:.2g} % of the air"]
 
     def _lately(self, key: Hashable, value: int, now: float) -> int:
         return self._meter.grown(key, value, now)

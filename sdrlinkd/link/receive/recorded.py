@@ -1,0 +1,67 @@
+"""Recordings in the clear: a PDU with commands that comes again, and our own id from others."""
+
+import hashlib
+from collections import deque
+
+from sdrlinkd.link.receive.acceptance import Acceptance
+from sdrlinkd.link.topics import HeardTopics
+from sdrlinkd.wire import Pdu
+
+COMMANDS_S = 10.0
+"""Time in s for which a PDU with commands is known again."""
+MOST_KEPT = 4096
+MOST_BURSTS = 256
+"""How many of our bursts are known again."""
+FOREIGN, FOREIGN_S = 3, 10.0
+"""How many PDUs with our id within how many s show that another robot has it."""
+
+
+class RecentCommands:
+    """Knows the PDUs with commands of the last 10 s again, octet by octet.
+
+    The duplicate filter knows fewer PDUs, and forgets them when their source restarts. New commands
+    differ: in their age, or in the numbers of PDU and entry.
+    """
+
+    def __init__(self, acceptance: Acceptance, topics: HeardTopics) -> None:
+        self._acceptance = acceptance
+        self._topics = topics
+        self._seen: set[bytes] = set()
+        self._order: deque[tuple[float, bytes]] = deque()
+
+    def has_heard(self, pdu: Pdu, octets: bytes, at: float) -> bool:
+        """Whether a PDU that came at `at` holds commands and came before; if not, it is noted."""
+        commands, topic = self._acceptance.commands, self._topics.topic
+        if not any(commands(topic(pdu.src, entry.topic_id)) for entry in pdu.entries):
+            return False
+        order = self._order
+        while order and (order[0][0] < at - COMMANDS_S or len(order) > MOST_KEPT):
+            self._seen.discard(order.popleft()[1])
+        digest = hashlib.blake2b(octets, digest_size=8).digest()
+        if digest in self._seen:
+            return True
+        self._seen.add(digest)
+        order.append((at, digest))
+        return False
+
+
+class OwnPdus:
+    """What we sent lately, to tell echoes and relayed copies of it from another robot's PDUs."""
+
+    def __init__(self) -> None:
+        self.bursts: deque[list[bytes]] = deque(maxlen=MOST_BURSTS)
+        """The PDUs of each of our last bursts."""
+        self._foreign: deque[float] = deque(maxlen=FOREIGN)
+
+    def heard(self, octets: bytes, at: float) -> None:
+        """Take an intact PDU with our id that came at `at`."""
+        # A relay changes hops, ages and CRC.
+        begin = octets[:4] + octets[5:10]
+        for burst in reversed(self.bursts):
+            if any(pdu[:4] + pdu[5:10] == begin for pdu in burst):
+                return
+        self._foreign.append(at)
+
+    def has_double(self, now: float) -> bool:
+        """Whether another robot was heard lately that has our id."""
+        return len(self._foreign) == FOREIGN and now - self._foreign[0] < FOREIGN_S
