@@ -160,6 +160,8 @@ class Link:
             params, reassembly, registry, self._heard_topics, own_id, relay, Inflated(dictionaries),
             max_expanded, hears_self, self.sealing, clear_size,
         )  # fmt: skip
+        self._team: frozenset[int] = frozenset()
+        """The robots that the configuration names."""
         self._own_bursts = self._reception.own_pdus.bursts
         self._receipts = Receipts(own_id, params.receipt_s)
         beacons = Beacons(params.beacon_s if has_control else 0.0, params.pdu_size, digest, rng)
@@ -191,6 +193,7 @@ class Link:
     def attach(self, traits: PduLinkTraits, access: AccessParams, rate: RateParams) -> Fit:
         """Fit the link to a radio that is up. Raises ConfigError and then changes nothing."""
         fit = fit_to(traits, access, rate, self.own_id, self._rng)
+        self._team = frozenset(access.nodes)
         self.use(fit)
         return fit
 
@@ -204,7 +207,7 @@ class Link:
             self._scheduler = BurstScheduler(
                 fit, self._outbox, self._composer, self._control_records, self._tx_delays,
                 self._forecasts, self._classes, self.own_id, self.registry.has_control,
-                self.sealing, self._answers, self._clear_size,
+                self.sealing, self._answers, self._knows, self._clear_size,
             )  # fmt: skip
         else:
             self._scheduler.refit(fit)
@@ -482,6 +485,10 @@ class Link:
     def _air_use(self) -> AirUse:
         repeats = self._answers.report()
         return AirUse(self._scheduler.report(), self._reception.heard_s, repeats)
+
+    def _knows(self, src: int, now: float) -> bool:
+        """Whether a robot is one of the team: the configuration names it, or it hears us, too."""
+        return src in self._team or self._clocks.has_contact(src, now)
 
     def _dispatch(self, events: list[Event]) -> list[Delivered]:
         """Handle the inbox's events in order; returns the messages to hand over."""

@@ -197,6 +197,14 @@ def test_another_schedule_is_told_of_and_not_followed(other):
     assert access.frame(1.0)[:2] == (1, 1)
 
 
+def tell_twice(access, src, frame, at):
+    """Robot `src` announces a schedule, and has done so a moment before."""
+    before_s = 0.01
+    phase_us = round(frame.phase_us - 1e6 * before_s) % round(1e6 * access.round_s)
+    access.take_frame(src, frame._replace(phase_us=phase_us), at - before_s)
+    access.take_frame(src, frame, at)
+
+
 def test_the_fewest_hops_are_followed_and_the_parent_at_once():
     access = make(4)
     schedule = begun(make(1), 9.0).frame(9.0).schedule
@@ -207,13 +215,15 @@ def test_the_fewest_hops_are_followed_and_the_parent_at_once():
 
     access.take_frame(3, Frame(2, 1, schedule, 1000), 10.0)
     assert told(10.0) == (2, 2, 1000)
-    access.take_frame(2, Frame(2, 0, schedule, 2000), 10.1)
+    access.take_frame(2, Frame(2, 0, schedule, 2000), 10.05)
+    assert told(10.0) == (2, 2, 1000), "a step in phase must be told twice"
+    tell_twice(access, 2, Frame(2, 0, schedule, 2000), 10.1)
     assert told(10.1) == (2, 1, 2000)
     access.take_frame(3, Frame(2, 1, schedule, 7000), 10.2)
     assert told(10.1) == (2, 1, 2000), "further away"
-    access.take_frame(2, Frame(2, 0, schedule, 2500), 10.3)
+    tell_twice(access, 2, Frame(2, 0, schedule, 2500), 10.3)
     assert told(10.3) == (2, 1, 2500), "the parent's clock is ours"
-    access.take_frame(3, Frame(1, 7, schedule, 4000), 10.4)
+    tell_twice(access, 3, Frame(1, 7, schedule, 4000), 10.4)
     assert told(10.4) == (1, 8, 4000), "a lower root"
     access.take_frame(2, Frame(2, 0, schedule, 9000), 10.5)
     assert told(10.4) == (1, 8, 4000), "whom the old parent has not heard of yet"
@@ -225,7 +235,7 @@ def test_who_follows_another_goes_where_that_one_is_and_nowhere_else():
     schedule = access.frame(9.0).schedule
     for step in range(20):
         at = 10.0 + 0.5 * step
-        access.take_frame(1, Frame(1, 0, schedule, 1000), at)
+        tell_twice(access, 1, Frame(1, 0, schedule, 1000), at)
         access.take_frame(3, Frame(3, 0, schedule, 7000), at + 0.1)
         assert access.frame(at)[:2] == (1, 1)
         assert abs(access.frame(at).phase_us - 1000) <= 1

@@ -84,7 +84,7 @@ def test_robots_take_every_step_of_tdma(taken):
     above, below = frame_of(robot(), 1, 0), frame_of(robot(), 3, 0)
     follower = robot()
     follower.take_frame(1, above, 1.0)
-    follower.take_frame(1, above, 1.5)
+    follower.take_frame(1, above, 1.0 + 16 * follower.round_s)
     assert "schedule of robot 1, 1 hops away" in follower.state
     follower.slot(wish(60.0))
     assert follower.state.endswith("schedule of robot 2")
@@ -94,6 +94,7 @@ def test_robots_take_every_step_of_tdma(taken):
     root.take_frame(3, below, 30.0)
     assert root.state.endswith("schedule of robot 2")
     root.take_frame(1, above, 31.0)
+    root.take_frame(1, above, 31.0 + 10 * root.round_s)
     assert "1 hops away" in root.state
     assert taken["tdma"] == set(TDMA_STEPS)
 

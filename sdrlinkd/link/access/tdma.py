@@ -200,9 +200,16 @@ class Tdma(BusyChannel):
         elif frame.level < MAX_LEVEL and (
             src == self._parent or told < (self._root, self._level) or self.role is State.LISTENING
         ):
+            if self._is_alone(at):
+                # Whoever has no followers moves nobody else.
+                self._phase.keep(origin)
+            kept = self._phase.follow(frame.root, origin, at)
+            if kept is None:
+                # Anybody could move the schedule with a single record.
+                return
             self._go(Happens.FOLLOWS)
             self._root, self._level, self._parent = *told, src
-            self._origin, self._told_at = origin, at
+            self._origin, self._told_at = kept, at
 
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that keep another schedule or none."""

@@ -25,6 +25,7 @@ class EntryIds:
         self.resting: deque[tuple[float, int]] = deque()
         """Resting ids as (time when free, id), in order of that time."""
         self._rest_s = rest_s
+        self.n_taken = 0
         self.taken = [0] * 256
         """How often each id was taken."""
 
@@ -79,6 +80,11 @@ class TopicEntryIds:
         if ids.resting:
             ids.wake(now)
         if ids.idle:
+            if not ids.n_taken & 0xFF:
+                # Before each round, so that equal messages differ in some octet: sequence numbers
+                # come round after 256 PDUs, too.
+                ids.idle.rotate(-1)
+            ids.n_taken += 1
             entry_id = ids.idle.popleft()
             ids.taken[entry_id] += 1
             return entry_id

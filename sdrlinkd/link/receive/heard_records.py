@@ -12,6 +12,7 @@ from sdrlinkd.wire import (
     Contact,
     Frame,
     KeyTold,
+    LinkReport,
     Parity,
     Pdu,
     Receipt,
@@ -24,6 +25,9 @@ from sdrlinkd.wire import (
 
 _ELSEWHERE = (Parity, Stamp, Contact, KeyTold)
 """Records that others take: the inbox, and sealing."""
+
+RECIPROCAL_DB = 15.0
+"""Largest difference in dB between the two directions that is believed: powers and noise differ."""
 
 
 class HeardRecords:
@@ -70,4 +74,17 @@ class HeardRecords:
                 if record.node == self._own_id:
                     events.append(RecordHeard(src, record, at))
             elif not is_relayed:
+                if isinstance(record, LinkReport):
+                    record = _plausible(record, neighbor.mean_snr_db)
                 events.append(RecordHeard(src, record, at))
+
+
+def _plausible(report: LinkReport, snr_db: float | None) -> LinkReport:
+    """A report of a robot that we hear at `snr_db`: both ways differ by RECIPROCAL_DB at most.
+
+    Otherwise a single false report would slow down, or speed up, what we send.
+    """
+    if snr_db is None:
+        return report
+    low, high = (round(4 * (snr_db + off)) for off in (-RECIPROCAL_DB, RECIPROCAL_DB))
+    return report._replace(snr_quarter_db=min(max(report.snr_quarter_db, low), high))

@@ -159,6 +159,10 @@ class Clocks:
         offset_ns = self._wall.ns - peer.wall.ns + round(1e9 * known.offset(now))
         return offset_ns, known.bound(now) + hosts_s, hosts_s
 
+    def has_contact(self, src: int, now: float) -> bool:
+        """Whether a robot hears our CLOCKs, and we hear its; always true without CLOCKs."""
+        return not self._period_s or self.state(src, now) is not State.UNSYNCED
+
     def state(self, src: int, now: float) -> State:
         """How well a robot's clock is known; our own always is."""
         if src == self._own_id:

@@ -42,6 +42,10 @@ from sdrlinkd.wire import (
 PATIENCE_S = 0.05
 """Shortest time in s that a RECEIPT or a WANTED waits for spare room."""
 MOST_RECEIPTS = 256
+UNANSWERED = 4
+"""How many robots share the airtime for records, whether they hear us or not."""
+MOST_BEACON_S = 5.0
+"""Longest time in s between two beacons, however many robots are heard."""
 LESS = 1.05
 """Factor on the period, which leaves a little of the share for robots not heard yet."""
 
@@ -100,6 +104,8 @@ class ControlRecords:
         self.receipts_untold = 0
         """RECEIPT records for others that were never sent, as too many were waiting."""
         self._n_others = 0
+        self._beacon_since = 0.0
+        """Since when a beacon waits."""
         # Starts of the bursts with the last CLOCK, and with the last PDU of only records.
         self._clock_told_at = self._told_alone_at = -inf
         self._clock_offered_at = 0.0
@@ -189,8 +195,12 @@ class ControlRecords:
 
         `pdu_s` is the airtime of a PDU with only records, in s.
         """
-        self._n_others = len(self._neighbors.present(now))
-        needed_s = LESS * (1 + self._n_others) * pdu_s / self._params.share
+        present = self._neighbors.present(now)
+        self._n_others = len(present)
+        # Anybody can pretend to be many robots, of which none answers.
+        n_answering = sum(self._clocks.has_contact(src, now) for src in present)
+        n_sharing = min(len(present), UNANSWERED + 2 * n_answering)
+        needed_s = LESS * (1 + n_sharing) * pdu_s / self._params.share
         self.period_s = max(self._params.period_s, needed_s)
 
     def tell_topics(self, now: float, pdu_s: float) -> None:
@@ -254,7 +264,10 @@ class ControlRecords:
             records.append(further)
         # Rate control and schedules depend on beacons; all other records can wait.
         is_needed = rate.adapts or frame is not None
-        self._piggyback.offer(records, start if is_needed else self._alone_from(start))
+        if not self._piggyback.holds(RecordType.BEACON):
+            self._beacon_since = start
+        alone_at = min(self._alone_from(start), max(start, self._beacon_since + MOST_BEACON_S))
+        self._piggyback.offer(records, start if is_needed else alone_at)
 
     def _offer_clock(self, start: float) -> None:
         waited = self._piggyback.holds(RecordType.CLOCK)

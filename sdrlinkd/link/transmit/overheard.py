@@ -1,16 +1,24 @@
 """Uses others' traffic for our own: for access, rate control, and forecasts."""
 
+from collections.abc import Callable
+
 from sdrlinkd.link.qos import CLASSES, Qos
 from sdrlinkd.link.receive import PduHeard
 from sdrlinkd.link.schedule import Forecasts
 from sdrlinkd.link.transmit.fit import Fit
 from sdrlinkd.wire import CONTROL_TOPIC_ID, Beacon, Frame, LinkReport, Record
 
+Knows = Callable[[int, float], bool]
+"""Whether a robot is one of the team: it is in access.nodes, or hears us, too."""
+
 
 class Overheard:
     """Passes what was heard to the access policy, to rate control, and to the forecasts."""
 
-    def __init__(self, fit: Fit, forecasts: Forecasts, own_id: int, has_control: bool) -> None:
+    def __init__(
+        self, fit: Fit, forecasts: Forecasts, own_id: int, has_control: bool, knows: Knows
+    ) -> None:
+        self._knows = knows
         self._access, self._rate = fit.settled.access, fit.rate
         self._forecasts = forecasts
         self._own_id = own_id
@@ -21,7 +29,7 @@ class Overheard:
         pdu, stamps, at, is_relayed = event
         src = pdu.src
         self._access.heard(src, at, is_relayed)
-        if not is_relayed:
+        if not is_relayed and self._knows(src, at):
             self._rate.heard(src, at)
         qos = CLASSES[pdu.qos]
         if not self._access.others_follow or qos > Qos.LATENCY or src == self._own_id:
@@ -38,7 +46,8 @@ class Overheard:
         """Note a record of robot `src` on whom it hears, its presence, or its schedule."""
         if isinstance(record, LinkReport):
             if record.node == self._own_id:
-                self._rate.take(src, record, at)
+                if self._knows(src, at):
+                    self._rate.take(src, record, at)
             else:
                 self._access.told_of(record.node, at)
         elif isinstance(record, Beacon):

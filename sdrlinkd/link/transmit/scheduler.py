@@ -26,7 +26,7 @@ from sdrlinkd.link.traits import Opportunity
 from sdrlinkd.link.transmit.burst import Burst, Outcome
 from sdrlinkd.link.transmit.control_records import ControlRecords
 from sdrlinkd.link.transmit.fit import Fit
-from sdrlinkd.link.transmit.overheard import Overheard
+from sdrlinkd.link.transmit.overheard import Knows, Overheard
 from sdrlinkd.link.transmit.rate import HeardThere
 from sdrlinkd.link.transmit.report import TransmitReport
 from sdrlinkd.link.transmit.retry import RetryQueue
@@ -60,8 +60,10 @@ class BurstScheduler:
     def __init__(
         self, fit: Fit, outbox: Outbox, composer: Composer, control_records: ControlRecords,
         tx_delays: TxDelayMeters, forecasts: Forecasts, classes: ClassesParams, own_id: int,
-        has_control: bool, sealing: Sealing | InTheClear, answers: Answers, clear_size: int,
+        has_control: bool, sealing: Sealing | InTheClear, answers: Answers, knows: Knows,
+        clear_size: int,
     ) -> None:  # fmt: skip
+        self._knows = knows
         self._answers = answers
         self._outbox = outbox
         self._lives = outbox.lives
@@ -100,7 +102,9 @@ class BurstScheduler:
         self._fit = fit
         self._access, self._rate = fit.settled.access, fit.rate
         self._answers.set_slower(fit.slower)
-        self._overheard = Overheard(fit, self._forecasts, self._own_id, self._has_control)
+        self._overheard = Overheard(
+            fit, self._forecasts, self._own_id, self._has_control, self._knows
+        )
 
     def more_to_send(self) -> None:
         """Revise the decision to keep the channel free, as a message has come."""
