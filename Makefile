@@ -54,8 +54,9 @@ soak: $(DEV_STAMP)
 	SDRLINK_TRIALS=30 $(PYTEST) --timeout=0 -m soak $(TESTS)
 	for i in 1 2 3 4 5 6 7 8 9 10; do $(BIN)/python -m pytest -m realtime $(TESTS) || exit 1; done
 
-# Laws on input that nobody has seen yet, another each time.
+# Each reader for so many seconds, by coverage; then laws on input that nobody has seen yet.
 fuzz: $(DEV_STAMP)
+	$(BIN)/python -m tests.fuzz $(or $(SECONDS),600)
 	SDRLINK_TRIALS=300 $(PYTEST) --timeout=0 -m hypothesis $(TESTS)
 
 fresh:

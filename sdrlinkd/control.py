@@ -94,7 +94,7 @@ class Control:
             return error("denied", f"{name} changes the daemon; allowed: root and its own user")
         try:
             arguments = msgspec.msgpack.decode(body, type=Arguments) if body else {}
-        except msgspec.DecodeError as problem:
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as problem:
             return error("bad_request", f"{name}: arguments: {problem}")
         try:
             return b"ok", verb.answer(arguments)

@@ -284,6 +284,8 @@ def test_control_refuses_in_words(start_daemon):
             ([b"sdrl1", b"1", b"status"], b"bad_request"),
             ([b"sdrl9", b"1", b"status", b""], b"bad_version"),
             ([b"sdrl1", b"1", b"status", b"\xc1"], b"bad_request"),
+            ([b"sdrl1", b"1", b"status", b"\x81\xa1\xe7\x01"], b"bad_request"),
+            ([b"sdrl1", b"1", b"status", b"\x81\xa1a" + b"\x91" * 100_000], b"bad_request"),
         ):
             dealer.send_multipart(frames)
             assert dealer.poll(5000)

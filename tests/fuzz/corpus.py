@@ -1,0 +1,118 @@
+"""Makes the stored corpus: `python -m tests.fuzz.corpus`. Each file begins a search."""
+
+import json
+from pathlib import Path
+from random import Random
+
+import numpy as np
+
+from backends.ether import protocol
+from sdrlinkd.link import ClockParams, Outcome, RepeatParams
+from sdrlinkd.pdulink.gnuradio import pmt
+from sdrlinkd.pdulink.gnuradio.pdus import to_gnu_radio
+from sdrlinkd.wire import (
+    Arrival,
+    Beacon,
+    Clock,
+    Contact,
+    Frame,
+    KeyTold,
+    LinkReport,
+    Met,
+    Need,
+    Parity,
+    Receipt,
+    RegistryDigest,
+    Repeat,
+    Stamp,
+    TopicPiece,
+    Waits,
+    Wanted,
+    build_records,
+)
+from tests.fuzz.mutate import Source, one_pdu
+from tests.fuzz.targets import PDU_SIZE
+from tests.link.world import make_link, next_burst
+
+CORPUS = Path(__file__).parent / "corpus"
+SHIPPED = Path(__file__).parents[2] / "etc"
+RECORDS = (
+    Stamp(1, 2, 3), Stamp(1, 2, 3, asks=True), Beacon(1, 2), Beacon(1, 2, 3),
+    RegistryDigest(bytes(8), b"abc"), LinkReport(2, -3, 4, 5), Receipt(1, 2, 1),
+    Receipt(1, 2, 1, 3, 4, 5), Parity(1, 2, 4, 1, 0, 0, 20, 75, b"parity"), Frame(1, 0, 2, 3),
+    Clock(1, 2, 1, 5, arrivals=(Arrival(2, 3, 40),), pdu_number=9), Waits(1, 85, 85, 85),
+    Need(1, 300, b"\x81"), TopicPiece(16, 7, 0, 1, b"\0\0" + bytes(8) + b"odom\0pkg/msg/Odom"),
+    Wanted(1, b"\x10\x11"), Repeat(1, 300, 12, 2),
+    Contact(bytes(8), (Met(2, bytes(4), 3),)), KeyTold(1, False, bytes(4)),
+)  # fmt: skip
+
+
+def link_inputs() -> list[bytes]:
+    """What a robot sends in half a second: messages, fragments, declarations, records."""
+    link = make_link(
+        1, pdu_size=PDU_SIZE, beacon_s=0.1, clock=ClockParams(), repeat=RepeatParams(),
+        has_numbers=True, hop_limit=3,
+    )  # fmt: skip
+    sent: list[bytes] = []
+    for i in range(50):
+        now = 0.01 * i
+        link.submit(i % 3, b"\0\1\0\0" + bytes(i % 7 * 30), now)
+        link.handle_timers(now)
+        burst = next_burst(link, now)
+        if burst is not None:
+            link.confirm(burst, Outcome.SENT, now)
+            sent.append(b"".join(burst.pdus))
+    return sent[:24]
+
+
+def inputs() -> dict[str, list[bytes]]:
+    """The inputs of each target."""
+    chance, source = Random(1), Source()
+    ours = link_inputs()
+    meta = {
+        "global": {"core:datatype": "ci8", "core:sample_rate": 1e6, "core:version": "1.2.6"},
+        "captures": [{"core:sample_start": 0, "core:frequency": 433e6}],
+        "annotations": [{"core:sample_start": 3, "core:sample_count": 4, "core:label": "gap"}],
+    }
+    envelope = [
+        b"/robot_1/odom\0",
+        b'{"q": 1, "ty": "nav_msgs/msg/Odometry", "t": 5}',
+        b"\0\1\0\0ab",
+    ]
+    packed = [b"/x\0", b"\x01\x82\xa1q\x01\xa2id\xa1a", b"\0\1\0\0"]
+    values = (True, -5, "name", [1, "two", None], {"key": 2.5}, np.arange(4, dtype=np.uint8))
+    air = (
+        protocol.encode(protocol.Question()), protocol.encode(protocol.Bye(token=5)),
+        b"\x81\xa4type\xa5Hello", b"\x82\xa4type\xa4Done\xa4seen\x05",
+    )  # fmt: skip
+    return {
+        "pdu": [pdu[:PDU_SIZE] for pdu in ours] + [one_pdu(chance) for _ in range(8)],
+        "records": [build_records([record]) for record in RECORDS] + [build_records(RECORDS[:4])],
+        "link": [*ours, b"".join(ours[:8])],
+        "sealed": [source.sealed(chance) for _ in range(12)],
+        "bus": [b"\xff".join(envelope), b"\xff".join(packed), b"\xff".join(envelope[:2])],
+        "config": [
+            path.read_bytes()[:6000] for path in sorted(SHIPPED.glob("*.toml"))
+        ] + [b'namespace = "robot_2"\nbackend = "loopback"\n[modem]\nrate_hz = "1 Msps"\n'],
+        "pmt": [pmt.dumps(value) for value in values] + [to_gnu_radio(ours[0][:PDU_SIZE])],
+        "sigmf": [json.dumps(meta).encode(), b'{"global": {}}'],
+        "hub": list(air),
+    }  # fmt: skip
+
+
+def write() -> int:
+    """Write the corpus anew; returns the number of files."""
+    n = 0
+    for target, found in inputs().items():
+        folder = CORPUS / target
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.iterdir():
+            old.unlink()
+        for i, data in enumerate(found):
+            (folder / f"{i:02}").write_bytes(data)
+            n += 1
+    return n
+
+
+if __name__ == "__main__":
+    print(f"{write()} inputs in {CORPUS}")  # noqa: T201
