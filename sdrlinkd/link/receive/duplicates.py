@@ -189,7 +189,7 @@ class SequenceTrack:
         """
         number = self.newest - ((self.newest - seq) & 0xFF)
         # Numbers come nearly in order, so what came first is nearly the lowest.
-        lowest = max(self._order[0] - WINDOW, self.newest - reach + 1)
+        lowest = max(self._order[0] - WINDOW, self.newest - reach)
         while number >= lowest:
             known = self._seen.get(number)
             if known is not None and known[0] == crc:

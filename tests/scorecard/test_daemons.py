@@ -1,0 +1,202 @@
+"""Rows with whole daemons: loads, other programs that fail, files, signals."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from sdrlinkd.client import Publisher
+from tests.scorecard.helpers import (
+    CDR,
+    Counting,
+    cpu_s,
+    descriptors,
+    problems,
+    rss_mib,
+    spawn,
+)
+from tests.waiting import wait_for
+
+pytestmark = pytest.mark.slow
+
+FLOOD = """
+    from sdrlinkd.client import Publisher
+    out = Publisher()
+    payload = bytes([0, 1, 0, 0]) + b"k" * 9000
+    print("ready", flush=True)
+    while True:
+        out.send("/robot_1/scan", payload, qos="bulk")
+"""
+FROZEN = """
+    from sdrlinkd.client import Subscriber
+    with Subscriber("/rx_robot_1/odom", depth=50) as heard:
+        print("ready", flush=True)
+        for message in heard:
+            pass
+"""
+
+
+def topics(tmp_path, n):
+    registry = tmp_path / "many.csv"
+    registry.write_text("".join(f"t{i},std_msgs/msg/String\n" for i in range(n)))
+    return f'registry = "{registry}"\n'
+
+
+def test_row_1_load(start_daemon, tmp_path, lasting, figure):
+    daemon = start_daemon(topics(tmp_path, 15))
+    payload, n = CDR + bytes(696), 0
+    with Counting(daemon.directory) as heard, Publisher(daemon.directory) as out:
+        began, cpu = time.monotonic(), cpu_s(daemon)
+        for _ in lasting():
+            out.send(f"/robot_1/t{n % 15}", payload)
+            n += 1
+            time.sleep(max(0.0, began + n / 500 - time.monotonic()))
+        wait_for(lambda: heard.count == n)
+        share = (cpu_s(daemon) - cpu) / (time.monotonic() - began)
+    assert daemon.snapshot().link.tx.dropped == {}
+    figure(1, "500 messages/s of 700 B, 15 topics", f"{n} of {n}, CPU {100 * share:.0f} %")
+
+
+def test_row_2_overload(start_daemon, tmp_path, lasting, figure):
+    daemon = start_daemon("[direct]\nrate_bit_s = 2e6\n[queue]\nmax_messages = 1000\n")
+    urgent, n = 0, 0
+    with Publisher(daemon.directory) as out:
+        for _ in range(2000):
+            out.send("/robot_1/scan", CDR + bytes(696), qos="bulk")
+        before = rss_mib(daemon)
+        for _ in lasting():
+            for _ in range(50):
+                out.send("/robot_1/scan", CDR + bytes(696), qos="bulk")
+            out.send("/robot_1/cmd_vel", CDR + bytes(48), qos="urgent")
+            urgent, n = urgent + 1, n + 51
+            time.sleep(0.01)
+        wait_for(lambda: daemon.snapshot().link.tx.accepted >= n + 2000)
+    snapshot, grown = daemon.snapshot(), rss_mib(daemon) / before - 1
+    (commands,) = (each for each in snapshot.link.topics if each.name.endswith("cmd_vel"))
+    assert commands.dropped == {}
+    assert problems(daemon) == []
+    assert grown < 0.25
+    figure(
+        2, "ten times the channel's capacity",
+        f"urgent {urgent} of {urgent}, {sum(snapshot.link.tx.dropped.values())} bulk messages shed "
+        f"by name, memory {100 * grown:+.0f} %",
+    )  # fmt: skip
+
+
+def test_row_3_producers_are_killed(start_daemon, lasting, figure):
+    daemon = start_daemon("[link]\npdu_size = 64\n[direct]\nrate_bit_s = 2e6\n")
+    whole, kills = CDR + b"k" * 9000, 0
+    with Counting(daemon.directory, is_whole=whole.__eq__) as heard:
+        for _ in lasting():
+            with spawn(FLOOD, daemon.directory) as producer:
+                producer.line()
+                before = daemon.snapshot().link.tx.accepted
+                wait_for(lambda before=before: daemon.snapshot().link.tx.accepted > before + 20)
+                producer.kill()
+            kills += 1
+        assert problems(daemon) == []
+        wait_for(lambda: heard.count > kills)
+    assert heard.damaged == 0
+    figure(3, "producers killed in mid-message", f"{kills} kills, 0 of {heard.count} messages torn")
+
+
+def test_row_4_a_consumer_is_frozen(start_daemon, lasting, figure):
+    daemon, n = start_daemon(), 0
+    with spawn(FROZEN, daemon.directory) as frozen, Counting(daemon.directory) as heard:
+        assert frozen.line() == "ready"
+        frozen.send_signal(signal.SIGSTOP)
+        before = rss_mib(daemon)
+        with Publisher(daemon.directory) as out:
+            for _ in lasting():
+                out.send("/robot_1/odom", CDR + bytes(700))
+                n += 1
+                time.sleep(5e-4)
+        wait_for(lambda: heard.count == n)
+        grown = rss_mib(daemon) - before
+        frozen.send_signal(signal.SIGCONT)
+    assert grown < 10
+    figure(4, "a frozen consumer beside a healthy one", f"{n} of {n}, memory {grown:+.1f} MiB")
+
+
+def test_row_13_the_clock_steps(start_daemon, lasting, figure):
+    stepping = (
+        "import time; real = time.time; began = real(); "
+        "time.time = lambda: real() + (0, 3600, -3600, 0.2, -0.2)[int(4 * (real() - began)) % 5]; "
+        "time.time_ns = lambda: int(1e9 * time.time());"
+    )
+    daemon, n = start_daemon("", stepping), 0
+    with Counting(daemon.directory) as heard, Publisher(daemon.directory) as out:
+        cpu, began = cpu_s(daemon), time.monotonic()
+        for _ in lasting():
+            out.send("/robot_1/odom", CDR + bytes(100))
+            n += 1
+            time.sleep(0.02)
+        wait_for(lambda: heard.count == n)
+        share = (cpu_s(daemon) - cpu) / (time.monotonic() - began)
+    assert problems(daemon) == []
+    assert share < 0.5, "no storm of timers"
+    figure(13, "wall clock ±1 h and ±0.2 s, four times a second", f"{n} of {n} messages")
+
+
+def test_row_16_a_second_instance(start_daemon, figure):
+    daemon = start_daemon()
+    done = subprocess.run(
+        [sys.executable, "-m", "sdrlinkd", "--config", str(daemon.config)],
+        capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert daemon.is_up()
+    figure(16, "a second daemon in the same place", f"exit code 2: {done.stderr.strip()[:60]}…")
+
+
+def test_row_18_soak(start_daemon, lasting, figure):
+    """Messages, killed producers, frozen consumers and reloads, all at once."""
+    daemon = start_daemon("[link]\npdu_size = 64\n[direct]\nrate_bit_s = 4e6\n")
+    with (
+        Counting(daemon.directory, "/rx_robot_1/odom") as heard,
+        Publisher(daemon.directory) as out,
+    ):
+        n, rounds, first = 0, 0, None
+        for left in lasting():
+            with spawn(FLOOD, daemon.directory) as flood, spawn(FROZEN, daemon.directory) as frozen:
+                flood.line()
+                frozen.line()
+                frozen.send_signal(signal.SIGSTOP)
+                for _ in range(min(200, int(100 * left) + 20)):
+                    out.send("/robot_1/odom", CDR + bytes(700), qos="urgent")
+                    n += 1
+                    time.sleep(0.005)
+                flood.kill()
+                frozen.kill()
+            daemon.send_signal(signal.SIGHUP)
+            rounds += 1
+            wait_for(lambda n=n: heard.count == n)
+            if first is None:
+                first = rss_mib(daemon), descriptors(daemon)
+        grown, more = rss_mib(daemon) - first[0], descriptors(daemon) - first[1]
+    assert problems(daemon) == []
+    assert (grown < 15, more <= 4) == (True, True), (grown, more)
+    figure(
+        18, "messages, kills, freezes and reloads",
+        f"{rounds} rounds, {n} of {n}, memory {grown:+.1f} MiB, descriptors {more:+d}",
+    )  # fmt: skip
+
+
+def test_row_19_stopped_under_load(start_daemon, lasting, figure):
+    worst_s, times = 0.0, 0
+    for _ in lasting():
+        daemon = start_daemon("drain_s = 0.3\n[direct]\nrate_bit_s = 2e6\n")
+        with spawn(FLOOD, daemon.directory) as flood:
+            flood.line()
+            wait_for(lambda daemon=daemon: daemon.snapshot().link.tx.accepted > 50)
+            began = time.monotonic()
+            daemon.ends_well()
+            worst_s = max(worst_s, time.monotonic() - began)
+            flood.kill()
+        assert "do not add up" not in daemon.log()
+        assert not [each for each in daemon.directory.iterdir() if each.suffix == ".sock"]
+        times += 1
+    figure(19, "SIGTERM under load, drain_s = 0.3", f"{times} times, exit within {worst_s:.2f} s")
