@@ -26,7 +26,7 @@ topics = ["cmd_vel"]
 sends = false
 """
 # Whole tenths, with a pause before each border for messages in flight.
-OUTAGE = "[outages]\ntimes = [[0.76, 1.16]]\n"
+OUTAGE = "[outages]\ntimes = [[0.76, 1.16]]\n[daemon.repeat]\nshare = 0.0\n"
 
 
 class LateListener(run_module.Listener):

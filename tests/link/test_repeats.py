@@ -12,6 +12,7 @@ from sdrlinkd.link import (
     ClassesParams,
     ClockParams,
     DefaultParams,
+    Opportunity,
     Overrides,
     Qos,
     RelayParams,
@@ -22,7 +23,15 @@ from sdrlinkd.link import (
 from sdrlinkd.wire import Need, Repeat, is_sealed
 from tests.laws import law
 from tests.link.steps import Steps
-from tests.link.world import make_link, neighbors, next_burst, records_in, rx, tell
+from tests.link.world import (
+    airtime_s,
+    make_link,
+    neighbors,
+    next_burst,
+    records_in,
+    rx,
+    tell,
+)
 
 STEP_S = 0.002
 AIR_S = 0.001
@@ -313,3 +322,19 @@ def test_what_was_lost_before_a_number_was_told_is_asked_for_too():
     air.flow(1, 40, size=90)
     air.run(air.now + 0.5)
     assert sorted(air.numbers(2)) == list(range(40))
+
+
+def test_where_a_burst_has_one_pdu_the_announcement_goes_ahead():
+    air = Air(lost=once(50, 51))
+
+    def one_pdu(link, now):
+        return link.next_burst(Opportunity(now, airtime_s, lambda _mcs, _s: 1))
+
+    air._next_burst = one_pdu
+    air.flow(1, 100)
+    air.run(air.now + 0.5)
+    assert sorted(air.numbers(2)) == list(range(100))
+    assert max(len(burst.pdus) for _, _, burst in air.bursts) == 1
+    for _, _, age_s, told_s in air.got:
+        assert told_s == pytest.approx(age_s, abs=3e-3)
+    assert neighbors(air.links[2])[1].pdus_repaired == 2

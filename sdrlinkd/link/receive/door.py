@@ -132,8 +132,9 @@ class Door:
 
     def _first(self, data: bytes, at: float) -> tuple[int | None, float]:
         """(number of a PDU that its source repeats, when it would have come at first)."""
-        if self._repeated and len(data) > SEQ:
-            repeated = self._repeated.find(data[1], data[SEQ], at)
+        neighbor = self._neighbors.get(data[1]) if self._repeated and len(data) > SEQ else None
+        if neighbor is not None:
+            repeated = self._repeated.find(data[1], data[SEQ], at, neighbor.track)
             if repeated is not None:
                 return repeated
         return None, at

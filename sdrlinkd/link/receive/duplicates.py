@@ -111,6 +111,11 @@ class SequenceTrack:
         self._note(number, crc, at)
         return True
 
+    def lacks(self, told: int) -> bool:
+        """Whether the PDU with a told number is missing, as far as is known."""
+        behind = (self.newest - told) % PDU_NUMBERS
+        return 0 < behind < MOST_PER_S and self.newest - behind not in self._seen
+
     def first_at(self, number: int, at: float) -> float:
         """When PDU `number`, which came at `at`, may have been sent first: that of the PDU before.
 

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from sdrlinkd.link.receive.duplicates import SequenceTrack
 from sdrlinkd.wire import PDU_NUMBERS, REPEAT_UNIT_S, Repeat
 
 LONGEST_HELD_S = 2.0
@@ -10,6 +11,10 @@ MOST_PDUS = 63
 SAME_BURST_S = 5e-3
 """Largest difference in s between the times of two PDUs of one burst; a radio tells no difference,
 datagrams come one after the other."""
+
+
+LATER_S = 0.5
+"""Time in s for which an announcement counts in later bursts."""
 
 
 class Repeated(NamedTuple):
@@ -43,10 +48,17 @@ class RepeatedPdus:
         self._by_src[node] = at, told
         return True
 
-    def find(self, src: int, seq: int, at: float) -> Repeated | None:
-        """What was announced of a PDU in the burst that came at `at`; None if it is a new one."""
+    def find(self, src: int, seq: int, at: float, track: SequenceTrack) -> Repeated | None:
+        """What was announced of a PDU in the burst that came at `at`; None if it is a new one.
+
+        A later burst may bring what is missing, too, unless it is the next new PDU.
+        """
         burst_at, told = self._by_src.get(src, (at, {}))
-        if not 0 <= at - burst_at <= SAME_BURST_S:
+        if not 0 <= at - burst_at <= LATER_S:
             del self._by_src[src]
             return None
-        return told.get(seq)
+        found = told.get(seq)
+        if found is None or at - burst_at <= SAME_BURST_S:
+            return found
+        is_next = seq == (track.newest + 1) & 0xFF
+        return found if track.lacks(found.number) and not is_next else None

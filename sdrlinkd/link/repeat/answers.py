@@ -27,6 +27,8 @@ UNION_S = 0.01
 """Time in s for which a PDU to everyone waits, so that one repetition serves all who ask."""
 TWICE_AFTER_S = 0.005
 """Time in s after which a PDU is sent for the second time unasked."""
+ANNOUNCED_S = 0.3
+"""Time in s for which an announcement counts."""
 SHORT_LIFE_S = 0.1
 """Lifespan in s below which nobody can ask in time."""
 MOST_WAITING = 512
@@ -41,6 +43,8 @@ class _Wanted:
     due_at: float
     askers: set[int] = field(default_factory=set)
     """Who asked; nobody if the PDU is sent twice unasked."""
+    announced_at: float = -inf
+    """When a REPEAT of a burst of its own announced it."""
 
 
 class RepeatGroup(NamedTuple):
@@ -50,6 +54,8 @@ class RepeatGroup(NamedTuple):
     qos: Qos
     mcs: int
     is_relayed: bool
+    announced: int = 0
+    """How many of them, the first ones, a REPEAT of an earlier burst announces."""
 
     def first(self, n: int) -> "RepeatGroup":
         """The first `n` of them."""
@@ -195,15 +201,22 @@ class Answers:
             return each.kept.qos, served_s, each.kept.number
 
         due.sort(key=rank)
-        first = due[0].kept
+        known = [each for each in due if start - each.announced_at < ANNOUNCED_S]
+        first = (known or due)[0].kept
         like = [
             each.kept
-            for each in due
+            for each in known or due
             if (each.kept.src, each.kept.qos, each.kept.mcs) == (first.src, first.qos, first.mcs)
         ]
         chosen = sorted(like[:most], key=lambda kept: kept.number)
         mcs = self._slower[first.mcs] if first.mcs < len(self._slower) else first.mcs
-        return RepeatGroup(chosen, first.qos, mcs, first.src != self._own_id)
+        n_known = len(chosen) if known else 0
+        return RepeatGroup(chosen, first.qos, mcs, first.src != self._own_id, n_known)
+
+    def announced(self, group: RepeatGroup, start: float) -> None:
+        """Note that a REPEAT in a burst at `start` announces PDUs of the next bursts."""
+        for kept in group.kept:
+            self.wanted[kept.src, kept.number].announced_at = start
 
     def took(self, group: RepeatGroup, start: float, airtime_s: float) -> None:
         """Note that PDUs are in a burst of `airtime_s` at `start`."""

@@ -10,6 +10,7 @@ sent again, unchanged except for the ages inside, before a new one is composed.
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from functools import partial
 from itertools import chain
 from math import inf
@@ -317,31 +318,30 @@ class BurstScheduler:
         group = answers.group(earliest, MAX_PDUS - 1)
         if group is None:
             return None
-        mcs = group.mcs
-        slot = self._access.slot(Wish(earliest, qos, airtime_s(mcs, 2), sensed))
-        if slot is None:
-            return None
-        start = slot.start
-        if self._sealing.is_on and not self._may_seal(start, 1):
-            return None
-        most = self._allowance(slot, mcs, opportunity, qos).most[qos]
-        if airtime_s(mcs, 2) > slot.end - start:
-            # A slot that is made for faster bursts.
+        mcs, announced = group.mcs, group.announced
+        n_told = 0 if group.is_relayed or announced else 1
+        slot = self._access.slot(Wish(earliest, qos, airtime_s(mcs, 1 + n_told), sensed))
+        if slot is None and self._access.keeps_schedule:
+            # Slots may be made for one PDU, or for faster bursts.
             mcs = group.kept[0].mcs
-        n_told = 0 if group.is_relayed else 1
-        if most <= n_told or airtime_s(mcs, 1 + n_told) > slot.end - start:
+            slot = self._access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed))
+        if slot is None or (self._sealing.is_on and not self._may_seal(slot.start, 1)):
             return None
-        group = group.first(most - n_told)
+        start, room_s = slot.start, slot.end - slot.start
+        most = self._allowance(slot, mcs, opportunity, qos).most[qos]
+        if most < 1 or airtime_s(mcs, 1) > room_s:
+            return None
+        if n_told and (most < 2 or airtime_s(mcs, 2) > room_s):
+            return self._announce(group.first(most), mcs, slot, airtime_s(mcs, 1))
+        group = group.first(min(most - n_told, announced or MAX_PDUS))
         if group.is_relayed:
-            pdus = [
-                self._composer.forwarded(kept.octets, start - kept.first_at) for kept in group.kept
-            ]
+            forwarded = self._composer.forwarded
+            pdus = [forwarded(kept.octets, start - kept.first_at) for kept in group.kept]
         else:
-            repeats, group = group.told(start, self._composer.k_single)
-            told = self._composer.fill_with_records(start, repeats)
-            pdus = [pdu.data for pdu in told]
-            if self._sealing.is_on:
-                pdus, _ = self._sealed(pdus, start)
+            pdus = []
+            if n_told:
+                repeats, group = group.told(start, self._composer.k_single)
+                pdus = self._made(repeats, start)
             pdus += [kept.octets for kept in group.kept]
         length_s = airtime_s(mcs, len(pdus))
         answers.took(group, start, length_s)
@@ -364,6 +364,27 @@ class BurstScheduler:
             n_timed=len(pdus) if group.is_relayed else n_told,
             repeated=group,
         )
+
+    def _announce(self, group: RepeatGroup, mcs: int, slot: Slot, length_s: float) -> Burst:
+        """A burst of a PDU that announces repetitions, where there is no room for both."""
+        start = slot.start
+        repeats, group = group.told(start, self._composer.k_single)
+        number = self._composer.next_number
+        pdus = self._made(repeats, start)
+        self._answers.announced(group, start)
+        self._spend(length_s, [group.qos])
+        self._access.sent(start + length_s, None)
+        self._number += 1
+        return Burst(
+            pdus, [[]], [group.qos], mcs, group.qos, start, max(start, slot.late_end - length_s),
+            length_s, self._number, first_start=start, n_records=1, ready_at=start, n_timed=1,
+            numbers=[number],
+        )  # fmt: skip
+
+    def _made(self, records: Sequence[Record], start: float) -> list[bytes]:
+        """A PDU with these records, for the air."""
+        pdus = [pdu.data for pdu in self._composer.fill_with_records(start, records)]
+        return self._sealed(pdus, start)[0] if self._sealing.is_on else pdus
 
     def _settle_repeated(
         self, burst: Burst, group: RepeatGroup, now: float, *, is_sent: bool
