@@ -49,8 +49,9 @@ test: $(DEV_STAMP) system-packages
 quick: $(DEV_STAMP)
 	SDRLINK_TRIALS=0.2 $(PYTEST) -m "not slow and not realtime" $(TESTS)
 
-# Rates with 30 times as many trials, then real time ten times over.
+# The scorecard, each row for so many seconds; rates with 30 times as many trials; real time ten times.
 soak: $(DEV_STAMP)
+	$(BIN)/python -m tests.scorecard $(or $(SECONDS),60)
 	SDRLINK_TRIALS=30 $(PYTEST) --timeout=0 -m soak $(TESTS)
 	for i in 1 2 3 4 5 6 7 8 9 10; do $(BIN)/python -m pytest -m realtime $(TESTS) || exit 1; done
 
