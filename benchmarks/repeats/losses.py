@@ -45,7 +45,7 @@ def recorded(folder: Path, least: float, most: float, seed: int) -> Losses:
     packet was lost.
     """
     with np.load(folder / "orbit_links_rssi.npz") as file:
-        lost = np.asarray(next(iter(file.values()))) == 255
+        lost = np.asarray(file["rssi"]) == 255
     shares = lost.mean(axis=1)
     links = lost[(shares >= least) & (shares <= most)]
     if not len(links):

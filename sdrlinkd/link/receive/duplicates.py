@@ -46,9 +46,9 @@ class SequenceTrack:
         self.fills = False
         """Whether it was missing before."""
         self.restarts = 0
-        # By number: what distinguishes the PDU from others with its sequence number, and when it
-        # came; in the order of arrival.
-        self._seen: dict[int, tuple[int, float]] = {}
+        # By number: what distinguishes the PDU from others with its sequence number, when it came,
+        # and the earliest time at which it may have come first; in the order of arrival.
+        self._seen: dict[int, tuple[int, float, float]] = {}
         self._order: deque[int] = deque()
         self._told_at = self._newest_at = -inf
         # Losses before `_anchor`, the first number of the present life; PDUs heard after it; and
@@ -68,11 +68,12 @@ class SequenceTrack:
 
     def heard(
         self, seq: int, crc: int, at: float = 0.0, told: int | None = None, *,
-        is_sealed: bool = False,
+        is_sealed: bool = False, first_at: float | None = None,
     ) -> bool:  # fmt: skip
         """Note a PDU that came at `at`; False if it is a duplicate.
 
-        `told`: its PDU number, if that was told. In place of its CRC, a sealed PDU has its T, which
+        `told`: its PDU number, if that was told. `first_at`: when it would have come at first, if
+        it is repeated. In place of its CRC, a sealed PDU has its T, which
         no other PDU with its sequence number has.
         """
         self.skipped, self.fills = NOTHING, False
@@ -108,7 +109,7 @@ class SequenceTrack:
         else:
             self.fills = True
             self._heard += number > self._anchor
-        self._note(number, crc, at)
+        self._note(number, crc, at, first_at)
         return True
 
     def lacks(self, told: int) -> bool:
@@ -121,11 +122,11 @@ class SequenceTrack:
 
         −inf: none of the 128 before it was heard. A burst with a newer PDU brings no older ones.
         """
-        if at == self._newest_at:
+        if at == self._newest_at or number == self.newest:
             return at
         for each in range(number - 1, number - WINDOW, -1):
             if each in self._seen:
-                return self._seen[each][1]
+                return self._seen[each][2]
         return -inf
 
     def goes_on(self) -> None:
@@ -202,9 +203,10 @@ class SequenceTrack:
             number -= 256
         return False
 
-    def _note(self, number: int, crc: int, at: float) -> None:
+    def _note(self, number: int, crc: int, at: float, first_at: float | None = None) -> None:
         self.number = number
-        self._seen[number] = crc, at
+        since = self.first_at(number, at) if first_at is None else first_at
+        self._seen[number] = crc, at, since
         self._order.append(number)
 
     def _forget(self, at: float) -> None:

@@ -114,8 +114,10 @@ class Inbox:
         neighbor.heard_at(at)
         key = self._key(admitted, read)
         track = neighbor.track
-        told = read.told if admitted.number is None else admitted.number
-        if not track.heard(*key[1:], at, told, is_sealed=key[0]):
+        told, repeated_at = read.told, None
+        if admitted.number is not None:
+            told, repeated_at = admitted.number, first_at
+        if not track.heard(*key[1:], at, told, is_sealed=key[0], first_at=repeated_at):
             neighbor.count_duplicate()
             return self._drop("rx_dup", events)
         if admitted.ticks is None and self._commands.has_heard(pdu, admitted.raw, at):

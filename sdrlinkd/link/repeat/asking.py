@@ -16,7 +16,7 @@ PATIENCE_S = 0.005
 RELAYED_PATIENCE_S = 0.05
 """The same where a relay may bring it."""
 ALONE_S = 0.05
-"""Time in s for which a question waits for spare room."""
+"""Time in s for which a question about one PDU waits for spare room; about n PDUs: one n-th."""
 ASKS = 3
 """How often a PDU is asked for."""
 FIRST_AGAIN_S = 0.08
@@ -55,6 +55,8 @@ class _Source:
     answer_s: float = FIRST_AGAIN_S / 2
     """Mean time from a question to its answer."""
     hears_relays: bool = False
+    heard_at: float = -inf
+    """When its last new PDU came."""
 
     @property
     def again_s(self) -> float:
@@ -94,6 +96,7 @@ class Asking:
             source = self._sources[pdu.src] = _Source()
         if source.missing:
             self._filled(source, event)
+        source.heard_at = event.at
         is_useful = event.is_wanted and event.read.control.n_entries < len(pdu.entries)
         source.useful += USEFUL_WEIGHT * (is_useful - source.useful)
         source.hears_relays = source.hears_relays or event.read.is_forwarded
@@ -130,7 +133,7 @@ class Asking:
             due = sorted(
                 number
                 for number, each in source.missing.items()
-                if each.next_at <= now and not self._awaits_parity(source, each, now)
+                if each.next_at <= now and not self._waits(source, each, now)
             )
             if due:
                 self._offered.append((src, due))
@@ -142,12 +145,13 @@ class Asking:
     @property
     def offered_alone_at(self) -> float:
         """From when the questions returned last have a PDU of their own; infinity: never."""
-        waited = [
+        alone_at = [
             min(self._sources[src].missing[number].next_at for number in numbers)
+            + ALONE_S / len(numbers)
             for src, numbers in self._offered
             if self._sources[src].useful > USEFUL
         ]
-        return max(min(waited, default=inf) + ALONE_S, self._free_at)
+        return max(min(alone_at, default=inf), self._free_at)
 
     def asked(self, start: float, waiting: Collection[int], alone_s: float) -> None:
         """Note that the questions returned last are in a burst at `start`.
@@ -221,28 +225,33 @@ class Asking:
                 del source.missing[number]
                 self._given_up += not is_over
 
-    def _awaits_parity(self, source: _Source, missing: _Missing, now: float) -> bool:
-        """Whether parity of the message around a missing PDU may still come; then it waits."""
+    def _waits(self, source: _Source, missing: _Missing, now: float) -> bool:
+        """Whether to ask later: parity may still come, or nothing was heard since the last time."""
+        if missing.asked_at >= source.heard_at:
+            missing.next_at = now + source.again_s
+            return True
         if not missing.inside or source.last is None or now - source.last.at > ALONE_S:
             return False
         running = _parts(source.last)
-        awaits = any(
+        awaits_parity = any(
             message in running and (message[0] == PARTS or message[0] in source.has_parity)
             for message in missing.inside
         )
-        if awaits:
+        if awaits_parity:
             missing.next_at = now + PATIENCE_S
-        return awaits
+        return awaits_parity
 
     def _look_ahead(self) -> None:
         self.due_at = self.alone_at = inf
         self._free_at = self._budget.next_at
         for source in self._sources.values():
             if source.missing:
-                next_at = min(each.next_at for each in source.missing.values())
+                times = [each.next_at for each in source.missing.values()]
+                next_at = min(times)
                 self.due_at = min(self.due_at, next_at)
-                if source.useful > USEFUL:
-                    self.alone_at = min(self.alone_at, next_at + ALONE_S)
+                if source.useful > USEFUL and next_at < inf:
+                    n = sum(at <= next_at + PATIENCE_S for at in times)
+                    self.alone_at = min(self.alone_at, next_at + ALONE_S / n)
         self.alone_at = max(self.alone_at, self._free_at)
 
 

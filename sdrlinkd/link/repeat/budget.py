@@ -2,7 +2,7 @@
 
 from math import inf
 
-SAVED_S = 0.02
+SAVED_S = 0.1
 """Most airtime in s that is saved up."""
 
 

@@ -95,6 +95,8 @@ class BurstScheduler:
         self._shares = Shares(classes)
         self._limits = Limits(classes, forecasts)
         self._held = _NOT_HELD
+        self._has_repeated = False
+        """Whether the last burst was a repeat."""
         self._ready_at: float | None = None
         self.refit(fit)
 
@@ -124,10 +126,13 @@ class BurstScheduler:
             self._ready_at = earliest - self._fit.lead_s
         if self._answers.wanted:
             repeated = self._answers.due_class(earliest)
-            if repeated is not None and (head is None or repeated <= head):
+            # Among equals, new messages and repeats take turns.
+            if repeated is not None and (head is None or repeated + self._has_repeated <= head):
                 burst = self._repeat(opportunity, repeated)
                 if burst is not None:
+                    self._has_repeated = True
                     return burst
+            self._has_repeated = False
         if head is None and earliest < records_due_at:
             return None
         qos, mcs = Qos.DEFAULT if head is None else head, rate.lowest
