@@ -8,7 +8,7 @@ import msgspec
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.access import AccessParams
-from sdrlinkd.link.packing import Composer, PiggybackRecords
+from sdrlinkd.link.packing import MAX_PDUS, Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos
 from sdrlinkd.link.queue import (
@@ -168,7 +168,9 @@ class Link:
         clock = clock if has_control else NO_CLOCK
         self._clocks = Clocks(clock, beacons.boot_id, own_id)
         self._tx_delays = TxDelayMeters()
-        self._asking = Asking(self._reception.holds, repeat.share if has_control else 0.0)
+        self._asking = Asking(
+            self._reception.holds, repeat.share if has_control else 0.0, self._composer.k_single
+        )
         self._answers = Answers(
             repeat, own_id, self._composer.entry_ids, has_control=has_control,
             has_numbers=has_numbers, is_sealed=self.sealing.is_on,
@@ -218,6 +220,7 @@ class Link:
             self.sealing.begin_anew()
             self._answers.restart()
             self._asking.restart()
+            self._reception.begin_anew()
         self.sealing.opener.set_uncertainty(fit.stamp_s)
         self._clocks.set_resolution(fit.stamp_s)
 
@@ -506,6 +509,7 @@ class Link:
                     self._answers.heard(event.read.pdu.src, event.number % PDU_NUMBERS)
                 case Newcomer():
                     self._asking.forget(event.src)
+                    self._answers.restarted(event.src)
                     # The new robot lacks the messages latched before.
                     self._latched.newcomer(event.src, event.at)
                     self._control_records.newcomer(event.at)
@@ -529,7 +533,7 @@ class Link:
         elif isinstance(record, Wanted):
             self._demand.hear(src, record, at)
         elif isinstance(record, Repeat):
-            if src != self.own_id:
+            if src != self.own_id and record.node == src and 0 < record.n_pdus <= MAX_PDUS:
                 self._answers.others_repeat(record, self._scheduler.record_pdu_s, at)
         elif isinstance(record, Need):
             self._asking.others_need(record, at)

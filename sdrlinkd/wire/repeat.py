@@ -51,12 +51,15 @@ class Repeat(NamedTuple):
     n_pdus: int
 
 
-def needs(node: int, missing: Iterable[int]) -> list[Need]:
-    """NEED records for the PDUs `missing`, in ascending order, of robot `node`."""
+def needs(node: int, missing: Iterable[int], most: int = MAX_BITMAP) -> list[Need]:
+    """NEED records for the PDUs `missing`, in ascending order, of robot `node`.
+
+    Their bitmaps have at most `most` octets.
+    """
     found: list[Need] = []
     first, bits, last = 0, 0, -1
     for number in missing:
-        if last >= 0 and number - first < 8 * MAX_BITMAP:
+        if last >= 0 and number - first < 8 * min(most, MAX_BITMAP):
             bits = bits << (number - last) | 1
         else:
             if last >= 0:

@@ -139,6 +139,16 @@ class SequenceTrack:
         self._settled = max(0, self.lost - self._leap)
         self._begin(seq if told is None else told, crc, at, is_told=told is not None)
 
+    def begin_anew(self) -> None:
+        """Go on with another clock; what was heard lately is forgotten."""
+        self._seen.clear()
+        self._order.clear()
+        self._told_at = self._newest_at = -inf
+
+    def distrust(self) -> None:
+        """Note that nothing is known of the times of other PDUs in the latest burst."""
+        self._newest_at = -inf
+
     def _begin(self, number: int, crc: int, at: float, *, is_told: bool) -> None:
         self.newest = self._anchor = number
         self.is_numbered = is_told
@@ -186,7 +196,8 @@ class SequenceTrack:
 
     def _may_be_late(self, number: int) -> bool:
         """Whether a PDU before the newest one may have been missing until now."""
-        return number >= self._order[0] or self.newest - number < REORDERED
+        lowest = self._order[0] if self._order else self.newest
+        return number >= lowest or self.newest - number < REORDERED
 
     def _is_known(self, seq: int, crc: int, reach: float) -> bool:
         """Whether the PDU was heard among the last `reach` ones.

@@ -149,8 +149,8 @@ class Inbox:
         for record in records:
             if isinstance(record, Beacon | Clock):
                 self._take_boot_id(record.boot_id, neighbor, read, key, at, now, events)
-            elif isinstance(record, Repeat) and not is_relayed and record.node == pdu.src:
-                self._ledger.skip_records(not self._repeated.take(record, at))
+            elif isinstance(record, Repeat) and not is_relayed and admitted.is_proven:
+                self._ledger.skip_records(not self._repeated.take(record, pdu.src, track, at))
         self._records.take(pdu, admitted, neighbor, records, is_relayed, now, events)
         repaired = self._repaired(pdu.src, records, at) if records else []
         if self._reassembly.lost:

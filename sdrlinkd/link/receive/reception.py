@@ -55,7 +55,7 @@ class Reception:
         self._ledger = RxLedger(topics)
         self.own_pdus = OwnPdus()
         """What this robot sent lately."""
-        repeated = RepeatedPdus()
+        repeated = self._repeated = RepeatedPdus()
         self._door = Door(sealing, self._acceptance, self._ledger, self.neighbors, repeated)
         completion = Completion(topics, self._acceptance, self._ledger, self.neighbors)
         self._inbox = Inbox(
@@ -87,6 +87,12 @@ class Reception:
         """
         self._door.expire(now)
         return self._inbox.expire(now)
+
+    def begin_anew(self) -> None:
+        """Go on with another clock; what was heard lately is not known again."""
+        self._repeated.clear()
+        for neighbor in self.neighbors:
+            neighbor.track.begin_anew()
 
     def relay_refused(self) -> None:
         """Move one PDU from rx_relayed to rx_not_for_us, as the queue refused it."""

@@ -13,6 +13,8 @@ SAME_BURST_S = 5e-3
 datagrams come one after the other."""
 
 
+NEAR = 128
+"""How far behind the newest one a PDU that comes in a later burst may be."""
 LATER_S = 0.5
 """Time in s for which an announcement counts in later bursts."""
 
@@ -33,11 +35,21 @@ class RepeatedPdus:
     def __bool__(self) -> bool:
         return bool(self._by_src)
 
-    def take(self, repeat: Repeat, at: float) -> bool:
-        """Take a REPEAT of its own source in a burst that came at `at`; False if it is nonsense."""
+    def clear(self) -> None:
+        """Forget all, as the clock starts anew."""
+        self._by_src.clear()
+
+    def take(self, repeat: Repeat, src: int, track: SequenceTrack, at: float) -> bool:
+        """Take a REPEAT of robot `src` in a burst that came at `at`; False if it is nonsense.
+
+        Only what a robot says of its own PDUs counts.
+        """
         node, number, held, n_pdus = repeat
         held_s = held * REPEAT_UNIT_S
+        if node != src:
+            return True
         if held_s > LONGEST_HELD_S or not 0 < n_pdus <= MOST_PDUS:
+            track.distrust()
             return False
         burst_at, told = self._by_src.get(node, (at, {}))
         if abs(at - burst_at) > SAME_BURST_S:
@@ -51,7 +63,7 @@ class RepeatedPdus:
     def find(self, src: int, seq: int, at: float, track: SequenceTrack) -> Repeated | None:
         """What was announced of a PDU in the burst that came at `at`; None if it is a new one.
 
-        A later burst may bring what is missing, too, unless it is the next new PDU.
+        A later burst may bring what is missing, too, unless a new PDU may have its sequence number.
         """
         burst_at, told = self._by_src.get(src, (at, {}))
         if not 0 <= at - burst_at <= LATER_S:
@@ -60,5 +72,5 @@ class RepeatedPdus:
         found = told.get(seq)
         if found is None or at - burst_at <= SAME_BURST_S:
             return found
-        is_next = seq == (track.newest + 1) & 0xFF
-        return found if track.lacks(found.number) and not is_next else None
+        is_near = (track.newest - found.number) % PDU_NUMBERS < NEAR
+        return found if is_near and track.lacks(found.number) else None

@@ -5,8 +5,9 @@ to ask and what to repeat, and when. It sends nothing itself: bursts and records
 `transmit`.
 """
 
-from sdrlinkd.link.repeat.answers import Answers, RepeatGroup
+from sdrlinkd.link.repeat.answers import Answers
 from sdrlinkd.link.repeat.asking import Asking
+from sdrlinkd.link.repeat.group import RepeatGroup
 from sdrlinkd.link.repeat.kept import Kept
 from sdrlinkd.link.repeat.params import RepeatParams
 

@@ -2,23 +2,19 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from math import ceil, inf
-from typing import NamedTuple
+from math import inf
 
 from sdrlinkd.link.packing import TopicEntryIds
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outgoing
 from sdrlinkd.link.repeat.budget import Budget
-from sdrlinkd.link.repeat.kept import Kept, KeptPdus
+from sdrlinkd.link.repeat.group import RepeatGroup, Wanted
+from sdrlinkd.link.repeat.kept import Kept, KeptPdus, is_lasting
 from sdrlinkd.link.repeat.params import RepeatParams
 from sdrlinkd.reports import RepeatReport
 from sdrlinkd.wire import (
     BROADCAST,
-    MAX_HELD_REPEAT,
     PDU_NUMBERS,
-    REPEAT_SIZE,
-    REPEAT_UNIT_S,
     Need,
     Repeat,
 )
@@ -27,56 +23,21 @@ UNION_S = 0.01
 """Time in s for which a PDU to everyone waits, so that one repetition serves all who ask."""
 TWICE_AFTER_S = 0.005
 """Time in s after which a PDU is sent for the second time unasked."""
-ANNOUNCED_S = 0.3
+ANNOUNCED_S = 0.45
 """Time in s for which an announcement counts."""
 SHORT_LIFE_S = 0.1
 """Lifespan in s below which nobody can ask in time."""
-MOST_WAITING = 512
-"""Most PDUs that wait to be sent again."""
+MOST_WAITING, MOST_OF_ONE = 1024, 128
+"""Most PDUs that wait to be sent again, of all robots and of one."""
+AGAIN_S = 0.8
+"""Age in s up to which a PDU is sent again; receivers know it again for a second."""
+MOST_ANNOUNCED = 2
+"""How often a PDU is announced in a burst of its own."""
+FORGETS = 0.99
+"""Factor on what was repeated for each robot, each time that `expire` is called."""
 FARTHEST_BEHIND = 100
-"""How far behind the newest one of its source a relayed PDU in the clear may be."""
-
-
-@dataclass(slots=True)
-class _Wanted:
-    kept: Kept
-    due_at: float
-    askers: set[int] = field(default_factory=set)
-    """Who asked; nobody if the PDU is sent twice unasked."""
-    announced_at: float = -inf
-    """When a REPEAT of a burst of its own announced it."""
-
-
-class RepeatGroup(NamedTuple):
-    """PDUs to be repeated in one burst: of one source, class and MCS."""
-
-    kept: list[Kept]
-    qos: Qos
-    mcs: int
-    is_relayed: bool
-    announced: int = 0
-    """How many of them, the first ones, a REPEAT of an earlier burst announces."""
-
-    def first(self, n: int) -> "RepeatGroup":
-        """The first `n` of them."""
-        return self._replace(kept=self.kept[:n])
-
-    def told(self, start: float, room: int) -> tuple[list[Repeat], "RepeatGroup"]:
-        """(REPEAT records for a burst at `start`, of at most `room` octets, what they name)."""
-        runs: list[list[Kept]] = []
-        for kept in self.kept:
-            last = runs[-1][-1] if runs else None
-            if last and (last.number + 1, last.first_at) == (kept.number, kept.first_at):
-                runs[-1].append(kept)
-            elif (len(runs) + 1) * REPEAT_SIZE <= room:
-                runs.append([kept])
-            else:
-                break
-        records = [
-            Repeat(run[0].src, run[0].number, _held(start - run[0].first_at), len(run))
-            for run in runs
-        ]
-        return records, self.first(sum(map(len, runs)))
+"""How far behind the newest one of its source a PDU in the clear may be: farther behind, one whose
+REPEAT is lost would look like a new one."""
 
 
 class Answers:
@@ -96,8 +57,10 @@ class Answers:
         self._twice = frozenset(twice) if has_control else frozenset()
         self._kept = KeptPdus(entry_ids, has_numbers=has_numbers)
         self._budget = Budget(max(params.share, 1e-6))
-        self.wanted: dict[tuple[int, int], _Wanted] = {}
+        self.wanted: dict[tuple[int, int], Wanted] = {}
         """The PDUs that wait to be sent again, by source and number."""
+        self._under_way: dict[tuple[int, int], Wanted] = {}
+        """Those in bursts whose outcome the radio has not reported."""
         self._repeated_until: dict[tuple[int, int], float] = {}
         """Until when each PDU was on the air for the last time, as far as it was repeated."""
         self._newest: Counter[int] = Counter()
@@ -115,10 +78,12 @@ class Answers:
     def sent(
         self, numbers: Sequence[int], pdus: Sequence[bytes], plain: Sequence[bytes],
         carried: Sequence[Sequence[Outgoing]], classes: Sequence[Qos], mcs: int, start: float,
+        *, is_postponed: bool = False,
     ) -> None:  # fmt: skip
-        """Keep the PDUs with messages of a burst that left at `start`.
+        """Keep the PDUs with messages of a burst that was to leave at `start`.
 
-        `numbers` are those of our own PDUs.
+        `numbers` are those of our own PDUs. `is_postponed`: it left later, with times that account
+        for it.
         """
         if not (self.is_on or self._twice):
             return
@@ -130,12 +95,12 @@ class Answers:
                 continue
             is_relayed = messages[0].is_whole
             told = messages[0].pdu_number if is_relayed else number % PDU_NUMBERS
-            if told is None:
+            if told is None or (is_postponed and not is_lasting(octets)):
                 continue
             kept = self._kept.keep(told, octets, inner or octets, mcs, qos, messages, start)
             self._newest[kept.src] = max(self._newest[kept.src], told)
             if qos in self._twice and any(_is_short_lived(each) for each in messages):
-                self.wanted[kept.src, told] = _Wanted(kept, start + TWICE_AFTER_S)
+                self.wanted[kept.src, told] = Wanted(kept, start + TWICE_AFTER_S)
 
     def needed(self, asker: int, need: Need, at: float, n_others: int) -> None:
         """Take a question that came at `at`, from one of `n_others` robots that hear us."""
@@ -156,16 +121,24 @@ class Answers:
                 continue
             known = self.wanted.get(key)
             if known is None:
-                if len(self.wanted) >= MOST_WAITING:
+                n_of_asker = sum(asker in each.askers for each in self.wanted.values())
+                if len(self.wanted) >= MOST_WAITING or n_of_asker >= MOST_OF_ONE:
                     self._refused += 1
                     continue
                 for_all = kept.dst == BROADCAST and n_others > 1
-                known = self.wanted[key] = _Wanted(kept, at + UNION_S * for_all)
+                known = self.wanted[key] = Wanted(kept, at + UNION_S * for_all)
             known.askers.add(asker)
 
     def others_repeat(self, repeat: Repeat, pdu_s: float, at: float) -> None:
         """Take what another robot repeats, in PDUs of `pdu_s`: all robots share the airtime."""
-        self._budget.spend((1 + repeat.n_pdus) * pdu_s, at)
+        self._budget.spend((1 + repeat.n_pdus) * pdu_s, at, is_bounded=True)
+
+    def restarted(self, src: int) -> None:
+        """Forget the PDUs of a robot that has restarted, and counts anew."""
+        self._newest.pop(src, None)
+        self._kept.forget_source(src)
+        for key in [key for key in self.wanted if key[0] == src]:
+            del self.wanted[key]
 
     def heard(self, src: int, number: int) -> None:
         """Note that another robot has sent a PDU that we might repeat."""
@@ -192,15 +165,22 @@ class Answers:
 
         Among equals, the robot for which least was repeated comes first.
         """
-        due = [each for each in self._due(start) if self._kept.renew_ids(each.kept, start)]
+        due = self._due(start)
+        for each in list(due):
+            if not self._kept.may_repeat(each.kept):
+                # Another message uses one of its entry ids.
+                due.remove(each)
+                del self.wanted[each.kept.src, each.kept.number]
+                self._unknown += 1
         if not due:
             return None
 
-        def rank(each: _Wanted) -> tuple[Qos, float, int]:
+        def rank(each: Wanted) -> tuple[Qos, float, int]:
             served_s = min((self._served_s[asker] for asker in each.askers), default=0.0)
             return each.kept.qos, served_s, each.kept.number
 
         due.sort(key=rank)
+        due = [each for each in due if each.kept.qos is due[0].kept.qos]
         known = [each for each in due if start - each.announced_at < ANNOUNCED_S]
         first = (known or due)[0].kept
         like = [
@@ -213,19 +193,27 @@ class Answers:
         n_known = len(chosen) if known else 0
         return RepeatGroup(chosen, first.qos, mcs, first.src != self._own_id, n_known)
 
-    def announced(self, group: RepeatGroup, start: float) -> None:
+    def announced(self, group: RepeatGroup, start: float, airtime_s: float) -> None:
         """Note that a REPEAT in a burst at `start` announces PDUs of the next bursts."""
+        self._budget.spend(airtime_s, start)
         for kept in group.kept:
-            self.wanted[kept.src, kept.number].announced_at = start
+            wanted = self.wanted[kept.src, kept.number]
+            wanted.announced_at = start
+            wanted.n_announced += 1
+            if wanted.n_announced > MOST_ANNOUNCED:
+                del self.wanted[kept.src, kept.number]
 
     def took(self, group: RepeatGroup, start: float, airtime_s: float) -> None:
         """Note that PDUs are in a burst of `airtime_s` at `start`."""
         each_s = airtime_s / len(group.kept)
         for kept in group.kept:
-            wanted = self.wanted.pop((kept.src, kept.number))
-            self._repeated_until[kept.src, kept.number] = start + airtime_s
+            key = kept.src, kept.number
+            wanted = self._under_way[key] = self.wanted.pop(key)
+            self._repeated_until[key] = start + airtime_s
+            self._kept.renew_ids(kept, start)
             if wanted.askers:
                 self._budget.spend(each_s, start)
+                wanted.cost_s = each_s
             for asker in wanted.askers:
                 self._served_s[asker] += each_s / len(wanted.askers)
 
@@ -234,6 +222,7 @@ class Answers:
         self._pdus += len(group.kept)
         self._airtime_s += airtime_s
         for kept in group.kept:
+            self._under_way.pop((kept.src, kept.number), None)
             for message in kept.carried:
                 message.repeat()
 
@@ -242,11 +231,16 @@ class Answers:
         for kept in group.kept:
             key = kept.src, kept.number
             self._repeated_until.pop(key, None)
-            self.wanted.setdefault(key, _Wanted(kept, now, {kept.dst}))
+            wanted = self._under_way.pop(key, None)
+            if wanted is not None:
+                self._budget.spend(-wanted.cost_s, now)
+                self.wanted.setdefault(key, wanted)
 
     def expire(self, now: float) -> None:
         """Forget what is too old to be repeated."""
         self._kept.forget(now)
+        for asker in self._served_s:
+            self._served_s[asker] *= FORGETS
         if len(self._repeated_until) > MOST_WAITING:
             self._repeated_until = {
                 key: until
@@ -258,6 +252,7 @@ class Answers:
         """Go on with another clock; what was sent before is forgotten."""
         self._kept.clear()
         self.wanted.clear()
+        self._under_way.clear()
         self._repeated_until.clear()
         self._budget.restart()
 
@@ -272,12 +267,16 @@ class Answers:
             refused=self._refused,
         )
 
-    def _due(self, start: float) -> list[_Wanted]:
+    def _due(self, start: float) -> list[Wanted]:
         is_free = self._budget.free_at(start) <= start
         due = []
         for key, each in list(self.wanted.items()):
-            if each.kept.expires_at() <= start:
+            kept = each.kept
+            if kept.expires_at() <= start:
                 self._expired += 1
+                del self.wanted[key]
+            elif kept.first_at < start - AGAIN_S or self._is_stale(kept):
+                self._unknown += 1
                 del self.wanted[key]
             elif each.due_at <= start and (is_free or not each.askers):
                 due.append(each)
@@ -285,15 +284,10 @@ class Answers:
 
     def _is_stale(self, kept: Kept) -> bool:
         """Whether others could take a PDU for a new one."""
-        if not kept.is_relayed or self._is_sealed:
+        if self._is_sealed:
             return False
         return self._newest[kept.src] - kept.number > FARTHEST_BEHIND
 
 
 def _is_short_lived(message: Outgoing) -> bool:
     return message.expires_at - message.arrived_at < SHORT_LIFE_S
-
-
-def _held(held_s: float) -> int:
-    """A time in s in the unit of REPEAT, rounded up, so that ages are never too low."""
-    return min(max(0, ceil(held_s / REPEAT_UNIT_S)), MAX_HELD_REPEAT)

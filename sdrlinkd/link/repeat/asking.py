@@ -9,7 +9,15 @@ import msgspec
 from sdrlinkd.link.receive import PduPlaced
 from sdrlinkd.link.repeat.budget import Budget
 from sdrlinkd.reports import RepeatReport
-from sdrlinkd.wire import CONTROL_TOPIC_ID, PARTS, PDU_NUMBERS, Need, Parity, needs
+from sdrlinkd.wire import (
+    CONTROL_TOPIC_ID,
+    NEED_OVERHEAD,
+    PARTS,
+    PDU_NUMBERS,
+    Need,
+    Parity,
+    needs,
+)
 
 PATIENCE_S = 0.005
 """Time in s for which a PDU may still come out of order."""
@@ -41,6 +49,8 @@ class _Missing:
     inside: frozenset[tuple[int, int]]
     """(topic, entry id) of messages with fragments on both sides of it."""
     asks_left: int = ASKS
+    others_asked: bool = False
+    """Whether another robot has asked for it."""
     asked_at: float = -inf
 
 
@@ -70,8 +80,10 @@ class Asking:
     that hold only questions take at most `share` of the air.
     """
 
-    def __init__(self, holds: Holds, share: float) -> None:
+    def __init__(self, holds: Holds, share: float, room: int) -> None:
         self._holds = holds
+        self._most = max(1, room - NEED_OVERHEAD)
+        """Most octets of a bitmap, so that a question fits into a PDU."""
         self._is_on = share > 0
         self._budget = Budget(share)
         self._sources: dict[int, _Source] = {}
@@ -118,8 +130,9 @@ class Asking:
             return
         for number in need.numbers():
             missing = source.missing.get(number)
-            if missing is not None and missing.asked_at < at:
-                self._count(source, missing, at)
+            if missing is not None and not missing.others_asked:
+                missing.others_asked = True
+                missing.next_at = max(missing.next_at, at + source.again_s)
         self._look_ahead()
 
     def questions(self, now: float) -> list[Need]:
@@ -137,7 +150,7 @@ class Asking:
             )
             if due:
                 self._offered.append((src, due))
-                found += needs(src, due)
+                found += needs(src, due, self._most)
         self.is_offered = bool(found)
         self._look_ahead()
         return found
@@ -212,7 +225,7 @@ class Asking:
         missing.asks_left -= 1
         missing.asked_at = at
         missing.next_at = at + source.again_s
-        if not missing.asks_left:
+        if missing.asks_left <= 0:
             # Its answer may still come, but nobody asks again.
             missing.next_at = inf
 

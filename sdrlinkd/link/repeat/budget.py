@@ -23,10 +23,11 @@ class Budget:
         """When something may be spent, at `now` or later."""
         return max(now, self.next_at)
 
-    def spend(self, airtime_s: float, now: float) -> None:
-        """Spend airtime, in s."""
+    def spend(self, airtime_s: float, now: float, *, is_bounded: bool = False) -> None:
+        """Spend airtime, in s; `is_bounded`: no more debt than what can be saved up."""
         self._earn(now)
-        self._saved_s -= airtime_s
+        left_s = self._saved_s - airtime_s
+        self._saved_s = max(left_s, min(-SAVED_S, self._saved_s)) if is_bounded else left_s
 
     def restart(self) -> None:
         """Go on with another clock."""

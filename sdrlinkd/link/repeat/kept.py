@@ -7,7 +7,20 @@ from typing import NamedTuple
 from sdrlinkd.link.packing import TopicEntryIds
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outgoing
-from sdrlinkd.wire import BROADCAST, CONTROL_TOPIC_ID, PARTS, numbered, parse
+from sdrlinkd.wire import (
+    BROADCAST,
+    CONTROL_TOPIC_ID,
+    PARTS,
+    Parity,
+    Stamp,
+    is_sealed,
+    lasting_identity,
+    numbered,
+    parse,
+    postponed,
+    read_control_entries,
+    with_topic,
+)
 
 KEEP_S = 1.0
 """Time in s for which a PDU can be sent again."""
@@ -72,11 +85,18 @@ class KeptPdus:
         elif any(message.rests_id for message in carried):
             pdu = parse(plain, len(plain), is_intact=True)
             pdu = numbered(pdu) if self._has_numbers else pdu
-            fragments = [
-                (id_, entry_id, self._entry_ids.times_taken(id_, entry_id))
+            own = {(each.topic_id, each.entry_id) for each in pdu.entries}
+            ids = [
+                (id_, entry_id)
                 for id_, entry_id, _, total, _ in pdu.entries
                 if id_ != CONTROL_TOPIC_ID and (total > 1 or id_ == PARTS)
             ]
+            for record in map(with_topic, read_control_entries(pdu).records):
+                told = isinstance(record, Parity | Stamp) and (record.topic_id, record.entry_id)
+                if told and (isinstance(record, Parity) or told not in own):
+                    # Parity, or an age that went ahead.
+                    ids.append(told)
+            fragments = [(*each, self._entry_ids.times_taken(*each)) for each in ids]
         kept = Kept(octets[1], number, octets, start, mcs, qos, carried, fragments)
         key = kept.src, number
         if key not in self._kept:
@@ -103,9 +123,27 @@ class KeptPdus:
         self._order.clear()
         self._n_bytes = 0
 
-    def renew_ids(self, kept: Kept, start: float) -> bool:
-        """Let the entry ids in a PDU rest from `start` on, when it is repeated.
+    def forget_source(self, src: int) -> None:
+        """Forget the PDUs of a robot that has restarted."""
+        for key in [key for key in self._kept if key[0] == src]:
+            self._order.remove(kept := self._kept.pop(key))
+            self._n_bytes -= len(kept.octets)
 
-        Returns False if another message uses one by now, so that the PDU must not be repeated.
-        """
-        return all(self._entry_ids.rest_again(*each, start) for each in kept.fragments)
+    def may_repeat(self, kept: Kept) -> bool:
+        """Whether no other message uses an entry id in a PDU by now."""
+        return all(
+            self._entry_ids.times_taken(channel, entry_id) == taken
+            for channel, entry_id, taken in kept.fragments
+        )
+
+    def renew_ids(self, kept: Kept, start: float) -> None:
+        """Let the entry ids in a PDU rest from `start` on, when it is repeated."""
+        for each in kept.fragments:
+            self._entry_ids.rest_again(*each, start)
+
+
+def is_lasting(octets: bytes) -> bool:
+    """Whether others know a PDU again after its times have grown."""
+    if is_sealed(octets):
+        return True
+    return lasting_identity(postponed(octets, 100_000)) == lasting_identity(octets)

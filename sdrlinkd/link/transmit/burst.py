@@ -40,6 +40,8 @@ class Burst(NamedTuple):
     """The inner PDUs of sealed ones, empty for those of other robots; none if nothing is sealed."""
     numbers: list[int] = []  # noqa: RUF012  # never changed
     """The PDU number of each PDU of ours, without its wrapping around."""
+    planned_start: float | None = None
+    """When it was to leave, if it left later."""
     repeated: RepeatGroup | None = None
     """The PDUs inside that are repeated, if this is why the burst leaves."""
 

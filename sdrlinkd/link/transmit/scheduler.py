@@ -35,6 +35,8 @@ from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
 from sdrlinkd.sealing import InTheClear, Sealing
 from sdrlinkd.wire import TICKS_PER_S, Record
 
+POSTPONED_S = 1e-5
+"""Time in s from which a burst counts as postponed."""
 TICK_S = 1 / TICKS_PER_S
 """Time in s after which there are new numbers for sealed PDUs."""
 
@@ -132,7 +134,6 @@ class BurstScheduler:
                 if burst is not None:
                     self._has_repeated = True
                     return burst
-            self._has_repeated = False
         if head is None and earliest < records_due_at:
             return None
         qos, mcs = Qos.DEFAULT if head is None else head, rate.lowest
@@ -181,6 +182,7 @@ class BurstScheduler:
             pdus, inner = self._sealed(pdus, start)
         access.sent(start + length_s, self._relayed_src(pdus))
         ready_at, self._ready_at = self._ready_at, None
+        self._has_repeated = False
         self._number += 1
         return Burst(
             pdus,
@@ -222,9 +224,10 @@ class BurstScheduler:
             self._bursts_sent += 1
             self._pdus_sent += len(burst.pdus)
             self._lives.left(burst.carried)
+            planned = burst.start if burst.planned_start is None else burst.planned_start
             self._answers.sent(
                 burst.numbers, burst.pdus, burst.inner, burst.carried, burst.classes, burst.mcs,
-                burst.start,
+                planned, is_postponed=burst.start > planned + POSTPONED_S,
             )  # fmt: skip
             return
         self._bursts_failed += 1
@@ -333,6 +336,9 @@ class BurstScheduler:
         if slot is None or (self._sealing.is_on and not self._may_seal(slot.start, 1)):
             return None
         start, room_s = slot.start, slot.end - slot.start
+        group = group.alive(start)
+        if not group.kept:
+            return None
         most = self._allowance(slot, mcs, opportunity, qos).most[qos]
         if most < 1 or airtime_s(mcs, 1) > room_s:
             return None
@@ -376,7 +382,7 @@ class BurstScheduler:
         repeats, group = group.told(start, self._composer.k_single)
         number = self._composer.next_number
         pdus = self._made(repeats, start)
-        self._answers.announced(group, start)
+        self._answers.announced(group, start, length_s)
         self._spend(length_s, [group.qos])
         self._access.sent(start + length_s, None)
         self._number += 1
