@@ -179,10 +179,7 @@ class ModemLink:
             if report.problem:
                 self._problem = report.problem
             if report.start is not None:
-                left_at = report.start / self._params.rate_hz
-                if left_at > burst.start + 1e-9:
-                    burst = burst._replace(planned_start=burst.start)
-                burst = burst._replace(start=left_at)
+                burst = burst._replace(start=report.start / self._params.rate_hz)
             self._listener.settled(burst, report.outcome, report.end / self._params.rate_hz)
         self._settled.set()
         self._turns.wake()

@@ -115,8 +115,8 @@ async def test_every_pdu_comes_back_and_every_burst_is_settled(paced):
         pdus = [pdu for burst in sent for pdu in burst.pdus]
         await listener.until(lambda: len(listener.pdus) == len(pdus))
         assert [heard.data for heard in listener.pdus] == pdus
-        settled = [burst._replace(start=0.0, planned_start=None) for burst, _, _ in listener.settled_bursts]
-        assert settled == [burst._replace(start=0.0, planned_start=None) for burst in listener.taken]
+        settled = [burst._replace(start=0.0) for burst, _, _ in listener.settled_bursts]
+        assert settled == [burst._replace(start=0.0) for burst in listener.taken]
         assert {outcome for _, outcome, _ in listener.settled_bursts} == {Outcome.SENT}
         for heard in listener.pdus:
             assert 10 < heard.snr_db < 20

@@ -41,7 +41,7 @@ class Burst(NamedTuple):
     numbers: list[int] = []  # noqa: RUF012  # never changed
     """The PDU number of each PDU of ours, without its wrapping around."""
     planned_start: float | None = None
-    """When it was to leave, if it left later."""
+    """When it was to leave at last; times inside are those of then."""
     repeated: RepeatGroup | None = None
     """The PDUs inside that are repeated, if this is why the burst leaves."""
 

@@ -50,5 +50,6 @@ class RetryQueue:
             pdus=[pdu for pdu, _ in moved],
             inner=[each for _, each in moved],
             start=start,
+            planned_start=start,
             numbers=numbers,
         )

@@ -198,6 +198,7 @@ class BurstScheduler:
             n_records=n_records,
             ready_at=ready_at,
             clock=clock,
+            planned_start=start,
             n_timed=len(pdus) * self._has_control,
             inner=inner,
             numbers=list(range(first_number, first_number + len(built))),
