@@ -12,9 +12,11 @@ from sdrlinkd.wire import (
     Entry,
     Frame,
     LinkReport,
+    Need,
     Pdu,
     Receipt,
     RegistryDigest,
+    Repeat,
     Stamp,
     TopicPiece,
     Waits,
@@ -53,6 +55,8 @@ RECORD_CLASSES = {
     "WAITS": Waits,
     "TOPIC": TopicPiece,
     "WANTED": Wanted,
+    "NEED": Need,
+    "REPEAT": Repeat,
 }
 
 each_pdu = pytest.mark.parametrize("vector", PDUS, ids=lambda v: v.name)

@@ -379,9 +379,64 @@ WANTED = RecordsVector(
     "wanted", bytes([17, 4, 1, 0x10, 0x11, 0xFF]), (("WANTED", (1, b"\x10\x11\xff")),)
 )
 WAITS = RecordsVector("waits", bytes([9, 4, 3, 255, 0, 7]), (("WAITS", (3, 255, 0, 7)),))
+# PDU number 100 005 = 0x000186A5 behind the fields of BEACON.
+BEACON_NUMBERED = RecordsVector(
+    "beacon_numbered",
+    bytes([2, 8, 0xBE, 0xEF, 0x02, 0x01, 0x00, 0x01, 0x86, 0xA5]),
+    (("BEACON", (0xBEEF, 513, 100_005)),),
+)
+# Number 7 tells that 6 left at 1 s = 0x3B9ACA00 ns; wall 2**60 ns, ± 5 µs. Robot 9's 0x0102 came
+# 2.5 µs later: 250 = 0xFA; robot 200's 0xFFFF came (2**31 - 1) * 10 ns later. PDU number 2**32 - 1.
+# 24 + 2 * 7 + 4 = 42 octets.
+CLOCK_NUMBERED = RecordsVector(
+    "clock_numbered",
+    bytes([8, 42, 0xBE, 0xEF, 0, 7, 0, 6, 0, 0, 0, 0, 0x3B, 0x9A, 0xCA, 0x00])
+    + bytes([0x10, 0, 0, 0, 0, 0, 0, 0, 0, 5])
+    + bytes([9, 0x01, 0x02, 0x00, 0x00, 0x00, 0xFA])
+    + bytes([200, 0xFF, 0xFF, 0x7F, 0xFF, 0xFF, 0xFF])
+    + bytes([0xFF, 0xFF, 0xFF, 0xFF]),
+    ((
+        "CLOCK",
+        (
+            0xBEEF, 7, 6, 1_000_000_000, 1 << 60, 5,
+            ((9, 0x0102, 2_500), (200, 0xFFFF, 21_474_836_470)),
+            4_294_967_295,
+        ),
+    ),),
+)  # fmt: skip
+# None has left: stamped is the number itself. Wall not known: -2**63. No arrivals; PDU number 0.
+CLOCK_FIRST = RecordsVector(
+    "clock_first",
+    bytes([8, 28, 0x00, 0x01, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0])
+    + bytes([0x80, 0, 0, 0, 0, 0, 0, 0, 0, 0])
+    + bytes([0, 0, 0, 0]),
+    (("CLOCK", (1, 0, 0, 0, -(1 << 63), 0, (), 0)),),
+)
+# 300 = 0x012C; bits 0, 2 and 7 from the top: 1010 0001.
+NEED = RecordsVector(
+    "need",
+    bytes([10, 6, 3, 0x00, 0x00, 0x01, 0x2C, 0xA1]),
+    (("NEED", (3, 300, b"\xa1")),),
+)
+NEED_NUMBERS = (300, 302, 307)
+# Bits 0, 15, 16, 17, 67, 70 and 127 from the top; bit 16 stands for 2**32 = 0.
+NEED_WIDE = RecordsVector(
+    "need_wide",
+    bytes([10, 21, 3, 0xFF, 0xFF, 0xFF, 0xF0])
+    + bytes([0x80, 0x01, 0xC0, 0, 0, 0, 0, 0, 0x12, 0, 0, 0, 0, 0, 0, 0x01]),
+    (("NEED", (3, 0xFFFFFFF0, b"\x80\x01\xc0" + bytes(5) + b"\x12" + bytes(6) + b"\x01")),),
+)
+NEED_WIDE_NUMBERS = (0xFFFFFFF0, 0xFFFFFFFF, 0, 1, 51, 54, 111)
+# Robot 1 repeats 300 and 301, held for 123.4 ms = 1234 = 0x04D2.
+REPEAT = RecordsVector(
+    "repeat",
+    bytes([18, 8, 1, 0x00, 0x00, 0x01, 0x2C, 0x04, 0xD2, 2]),
+    (("REPEAT", (1, 300, 1234, 2)),),
+)
 RECORDS = (
     STAMP, STAMP_OLD, BEACON_DIGEST, LINK_REPORT, RECEIPT, FRAME,
     ASKING_STAMP, FULL_RECEIPT, CLOCK, WAITS, TOPIC, TOPIC_PIECE, WANTED,
+    BEACON_NUMBERED, CLOCK_NUMBERED, CLOCK_FIRST, NEED, NEED_WIDE, REPEAT,
 )  # fmt: skip
 
 _stamped = PduVector(
@@ -490,6 +545,88 @@ _spoilt = PduVector(
     ])),
 )  # fmt: skip
 
+# Seq is the lowest octet of the PDU number that the record tells.
+_beacon_numbered = PduVector(
+    "beacon_numbered",
+    64, DEFAULT, 5, EVERYONE, 0xA5, 1,
+    (
+        EntryFields(
+            CONTROL, 0, 0, 1,
+            BEACON_NUMBERED.payload + bytes([3, 14, *TABLE_4.digest, *TABLE_4.per_topic]),
+        ),
+    ),
+    with_crc(
+        bytes([0x00, 5, 0xFF, 0xA5, 0x11, 0xF0, 0x00, 0, 1, 0x00, 0x1A])
+        + bytes([2, 8, 0xBE, 0xEF, 0x02, 0x01, 0x00, 0x01, 0x86, 0xA5])
+        + bytes([3, 14]) + TABLE_4.digest + TABLE_4.per_topic
+        + bytes(25)  # 64 - 8 - 31 = 25
+    ),
+)  # fmt: skip
+
+_clock_numbered = PduVector(
+    "clock_numbered",
+    64, DEFAULT, 1, EVERYONE, 0xFF, 1,
+    (EntryFields(CONTROL, 0, 0, 1, CLOCK_NUMBERED.payload),),
+    with_crc(bytes([
+        0x00, 1, 0xFF, 0xFF, 0x11,
+        0xF0,
+        0x00, 0, 1, 0x00, 0x2C,
+        8, 42, 0xBE, 0xEF, 0, 7, 0, 6, 0, 0, 0, 0, 0x3B, 0x9A, 0xCA, 0x00,
+        0x10, 0, 0, 0, 0, 0, 0, 0, 0, 5,
+        9, 0x01, 0x02, 0x00, 0x00, 0x00, 0xFA,
+        200, 0xFF, 0xFF, 0x7F, 0xFF, 0xFF, 0xFF,
+        0xFF, 0xFF, 0xFF, 0xFF,
+        0, 0, 0, 0, 0, 0, 0,  # 64 - 8 - 49 = 7
+    ])),
+)  # fmt: skip
+
+_clock_and_need = PduVector(
+    "clock_and_need",
+    64, DEFAULT, 2, EVERYONE, 0, 1,
+    (EntryFields(CONTROL, 0, 0, 1, CLOCK_FIRST.payload + NEED.payload),),
+    with_crc(bytes([
+        0x00, 2, 0xFF, 0, 0x11,
+        0xF0,
+        0x00, 0, 1, 0x00, 0x26,
+        8, 28, 0x00, 0x01, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0x80, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0,
+        10, 6, 3, 0x00, 0x00, 0x01, 0x2C, 0xA1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,  # 64 - 8 - 43 = 13
+    ])),
+)  # fmt: skip
+
+# PDU 310 = 0x0136 announces 300 and 301, and asks robot 3 for some.
+_need_and_repeat = PduVector(
+    "need_and_repeat",
+    64, DEFAULT, 1, EVERYONE, 0x36, 1,
+    (EntryFields(CONTROL, 0, 0, 1, NEED_WIDE.payload + REPEAT.payload),),
+    with_crc(bytes([
+        0x00, 1, 0xFF, 0x36, 0x11,
+        0xF0,
+        0x00, 0, 1, 0x00, 0x21,
+        10, 21, 3, 0xFF, 0xFF, 0xFF, 0xF0,
+        0x80, 0x01, 0xC0, 0, 0, 0, 0, 0, 0x12, 0, 0, 0, 0, 0, 0, 0x01,
+        18, 8, 1, 0x00, 0x00, 0x01, 0x2C, 0x04, 0xD2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,  # 64 - 8 - 38 = 18
+    ])),
+)  # fmt: skip
+
+_message_and_repeat = PduVector(
+    "message_and_repeat",
+    48, LATENCY, 1, EVERYONE, 0x36, 1,
+    (EntryFields(1, 0x2A, 0, 1, HI), EntryFields(CONTROL, 0, 0, 1, STAMP.payload + REPEAT.payload)),
+    with_crc(bytes([
+        0x04, 1, 0xFF, 0x36, 0x12,
+        0x1F,
+        0x2A, 0, 1, 0x00, 0x06, 0x00, 0x01, 0x00, 0x00, 0x68, 0x69,
+        0x00, 0, 1, 0x00, 0x12,
+        1, 6, 1, 0x2A, 0x00, 0x12, 0xD6, 0x87,
+        18, 8, 1, 0x00, 0x00, 0x01, 0x2C, 0x04, 0xD2, 2,
+        0, 0, 0, 0, 0, 0,  # 48 - 8 - 11 - 23 = 6
+    ])),
+)  # fmt: skip
+
 PDUS = (
     _single,
     _single_full,
@@ -509,6 +646,11 @@ PDUS = (
     _timed,
     _timed_later,
     _spoilt,
+    _beacon_numbered,
+    _clock_numbered,
+    _clock_and_need,
+    _need_and_repeat,
+    _message_and_repeat,
 )
 BY_NAME = {vector.name: vector for vector in PDUS}
 
