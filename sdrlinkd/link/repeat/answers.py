@@ -35,9 +35,9 @@ MOST_ANNOUNCED = 2
 """How often a PDU is announced in a burst of its own."""
 FORGETS = 0.99
 """Factor on what was repeated for each robot, each time that `expire` is called."""
-FARTHEST_BEHIND = 100
-"""How far behind the newest one of its source a PDU in the clear may be: farther behind, one whose
-REPEAT is lost would look like a new one."""
+FARTHEST_BEHIND, RELAYED_BEHIND = 120, 100
+"""How far behind the next one of its source a PDU in the clear may be: farther behind, one whose
+REPEAT is lost would look like a new one. A relay knows less of what the source has sent."""
 
 
 class Answers:
@@ -59,12 +59,14 @@ class Answers:
         self._budget = Budget(max(params.share, 1e-6))
         self.wanted: dict[tuple[int, int], Wanted] = {}
         """The PDUs that wait to be sent again, by source and number."""
+        self._next_number = 0
+        """The number of our next PDU, or of one before."""
         self._under_way: dict[tuple[int, int], Wanted] = {}
         """Those in bursts whose outcome the radio has not reported."""
         self._repeated_until: dict[tuple[int, int], float] = {}
         """Until when each PDU was on the air for the last time, as far as it was repeated."""
         self._newest: Counter[int] = Counter()
-        """The highest number sent, by source."""
+        """The highest number relayed, by source."""
         self._served_s: defaultdict[int, float] = defaultdict(float)
         """Airtime spent for each robot that asked, in s."""
         self._pdus = self._asked = self._unknown = self._expired = self._refused = 0
@@ -98,6 +100,8 @@ class Answers:
             if told is None or (is_postponed and not is_lasting(octets)):
                 continue
             kept = self._kept.keep(told, octets, inner or octets, mcs, qos, messages, start)
+            if not is_relayed:
+                self._next_number = told + 1
             self._newest[kept.src] = max(self._newest[kept.src], told)
             if qos in self._twice and any(_is_short_lived(each) for each in messages):
                 self.wanted[kept.src, told] = Wanted(kept, start + TWICE_AFTER_S)
@@ -152,11 +156,12 @@ class Answers:
         asked_at = min((e.due_at for e in self.wanted.values() if e.askers), default=inf)
         return min(twice_at, max(asked_at, self._budget.free_at(now)))
 
-    def due_class(self, start: float) -> Qos | None:
+    def due_class(self, start: float, next_number: int) -> Qos | None:
         """The most urgent class of the PDUs that may be repeated at `start`; None: there are none.
 
-        What has expired by then is dropped.
+        What has expired by then is dropped. Our next PDU has `next_number`.
         """
+        self._next_number = next_number
         due = self._due(start)
         return min((each.kept.qos for each in due), default=None)
 
@@ -286,7 +291,9 @@ class Answers:
         """Whether others could take a PDU for a new one."""
         if self._is_sealed:
             return False
-        return self._newest[kept.src] - kept.number > FARTHEST_BEHIND
+        if kept.is_relayed:
+            return self._newest[kept.src] - kept.number > RELAYED_BEHIND
+        return (self._next_number - kept.number) % PDU_NUMBERS > FARTHEST_BEHIND
 
 
 def _is_short_lived(message: Outgoing) -> bool:

@@ -127,7 +127,7 @@ class BurstScheduler:
         if self._ready_at is None:
             self._ready_at = earliest - self._fit.lead_s
         if self._answers.wanted:
-            repeated = self._answers.due_class(earliest)
+            repeated = self._answers.due_class(earliest, composer.next_number)
             # Among equals, new messages and repeats take turns.
             if repeated is not None and (head is None or repeated + self._has_repeated <= head):
                 burst = self._repeat(opportunity, repeated)
