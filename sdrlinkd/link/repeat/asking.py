@@ -27,10 +27,10 @@ ALONE_S = 0.05
 """Time in s for which a question about one PDU waits for spare room; about n PDUs: one n-th."""
 ASKS = 3
 """How often a PDU is asked for."""
-FIRST_AGAIN_S = 0.08
+FIRST_AGAIN_S = 0.04
 LEAST_AGAIN_S, MOST_AGAIN_S = 0.02, 0.3
 """Limits of the time in s after which a PDU is asked for again."""
-WEIGHT = 0.125
+WEIGHT = 0.25
 """Weight of the newest answer in the mean time of answers."""
 KEEP_S = 1.0
 """Time in s after which its source has forgotten a PDU."""
