@@ -158,7 +158,7 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     pdus_heard: int
     """PDUs heard, without duplicates."""
     pdus_lost: int
-    """PDUs lost, by gaps in the sequence numbers."""
+    """PDUs lost, by gaps in the PDU numbers."""
     pdus_repaired: int = 0
     """PDUs lost at first that came when they were sent again; they are not in `pdus_lost`."""
     per: float

@@ -8,7 +8,7 @@ import msgspec
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.access import AccessParams
-from sdrlinkd.link.packing import MAX_PDUS, Composer, PiggybackRecords
+from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos
 from sdrlinkd.link.queue import (
@@ -34,6 +34,7 @@ from sdrlinkd.link.receive import (
     RecordHeard,
     RelayParams,
     Retain,
+    can_be_true,
 )
 from sdrlinkd.link.repeat import Answers, Asking, RepeatParams
 from sdrlinkd.link.report import NO_NAMES, Names, Reporter
@@ -229,9 +230,9 @@ class Link:
         burst = self._scheduler.next_burst(opportunity)
         if burst is not None:
             self._own_bursts.append(burst.pdus)
-        if burst is not None and self._composer.asking:
-            self._expect_receipts(burst.start)
-            self._tell_dropped()
+            if self._composer.asking:
+                self._expect_receipts(burst.start)
+                self._tell_dropped()
         return burst
 
     def next_wakeup(self, now: float) -> float:
@@ -465,7 +466,7 @@ class Link:
     def why(self, topic_id: int, told: Told, now: float) -> list[str]:
         """What happens to a topic's messages and why, in plain sentences."""
         name = self._topics[topic_id].name
-        return self._why.explain(topic_id, name, told, now, self._air_use)
+        return self._why.explain(topic_id, name, told, now, self._air_use())
 
     def report(self, now: float, names: Names = NO_NAMES) -> LinkReport:
         """Everything the link knows, at `now`."""
@@ -484,7 +485,6 @@ class Link:
 
     # Internal.
 
-    @property
     def _air_use(self) -> AirUse:
         repeats = self._answers.report()
         return AirUse(self._scheduler.report(), self._reception.heard_s, repeats)
@@ -533,7 +533,7 @@ class Link:
         elif isinstance(record, Wanted):
             self._demand.hear(src, record, at)
         elif isinstance(record, Repeat):
-            if src != self.own_id and record.node == src and 0 < record.n_pdus <= MAX_PDUS:
+            if src != self.own_id and record.node == src and can_be_true(record):
                 self._answers.others_repeat(record, self._scheduler.record_pdu_s, at)
         elif isinstance(record, Need):
             self._asking.others_need(record, at)

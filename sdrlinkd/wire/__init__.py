@@ -79,7 +79,10 @@ from sdrlinkd.wire.declared import (
     pieces,
 )
 from sdrlinkd.wire.later import (
+    DST,
     HOP,
+    SEQ,
+    SRC,
     aged,
     depends_on_start,
     forwarded,
@@ -160,6 +163,7 @@ __all__ = [
     "CONTROL_TOPIC_ID",
     "CRC_SIZE",
     "DECLARED_TOPIC_ID",
+    "DST",
     "ENTRY_HEADER_SIZE",
     "FIRST_NUMBER",
     "HASH_SIZE",
@@ -198,6 +202,8 @@ __all__ = [
     "REPEAT_SIZE",
     "REPEAT_UNIT_S",
     "SEAL_OVERHEAD",
+    "SEQ",
+    "SRC",
     "STAMP_SIZE",
     "TAG_SIZE",
     "TICKS_PER_S",

@@ -30,8 +30,9 @@ _U16 = struct.Struct(">H")
 # Times in smaller fields, in units of 0.1 ms. That of a RECEIPT may be absent.
 _SINCE, _SHORT_UNIT_US = 6, RECEIPT_UNIT_US
 _SHORT_POSTPONED = {int(RecordType.RECEIPT): _SINCE, int(RecordType.REPEAT): HELD_AT}
-_SEQ, HOP = 3, 4
-"""Index of the octet with the hops left and the number of entries."""
+SRC, DST, SEQ, HOP = 1, 2, 3, 4
+"""Indexes of the octets with source, destination and sequence number, and of that with the hops
+left and the number of entries."""
 
 
 def postponed(pdu: bytes, by_us: int) -> bytes:
@@ -57,7 +58,7 @@ def aged(pdu: bytes, by_us: int, *, only_ages: bool = False) -> bytes:
 def with_seq(pdu: bytes, seq: int) -> bytes:
     """A PDU with another sequence number."""
     data = bytearray(pdu)
-    data[_SEQ] = seq
+    data[SEQ] = seq
     return _with_crc(data)
 
 

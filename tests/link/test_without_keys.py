@@ -16,6 +16,7 @@ from sdrlinkd.link import (
 )
 from sdrlinkd.link.access import Wish, make_access
 from sdrlinkd.wire import Beacon, Frame, LinkReport, PduBuilder, build_records, flags
+from tests.link.radios import LOCKSTEP
 from tests.link.steps import Steps
 from tests.link.world import compose, make_link, neighbors, next_burst, rx, tell
 
@@ -64,6 +65,18 @@ def test_the_same_command_again_is_another_one():
     for i in range(600):
         for pdu in send(commander, 0.0201 * i + 1e-6 * (i % 7)):
             assert len(robot.hear(pdu, 0.0201 * i + 0.001)) == 1
+
+
+def test_a_command_is_obeyed_after_our_clock_has_begun_anew():
+    robot, commander = commanded()
+    for at in (500.0, 500.1):
+        (pdu,) = send(commander, at, b"\0\1\0\0" + str(at).encode())
+        assert len(robot.hear(pdu, at)) == 1
+    for link in (robot, commander):
+        link.attach(LOCKSTEP, AccessParams(policy="none"), RateParams())
+    (pdu,) = send(commander, 0.1)
+    assert len(robot.hear(pdu, 0.101)) == 1
+    assert not robot.audit()
 
 
 def test_another_boot_id_must_come_twice():

@@ -77,8 +77,7 @@ def test_row_12_the_disk_is_full(start_daemon, tmp_path, figure):
     )
     with command as recording:
         code = recording.wait(60)
-        told = recording.log() if hasattr(recording, "log") else ""
-    assert code == 2, told
+        assert code == 2, recording.log()
     assert daemon.is_up()
     assert problems(daemon) == []
     figure(12, "the disk is full", f"recording stops with exit code {code}; the link goes on")

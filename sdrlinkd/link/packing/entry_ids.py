@@ -46,16 +46,13 @@ class EntryIds:
                 return True
         return False
 
-    def rest_again(self, entry_id: int, taken: int, now: float) -> bool:
-        """Let an id rest anew from `now` on; False if it was taken more than `taken` times."""
-        if self.taken[entry_id] != taken:
-            return False
+    def rest_again(self, entry_id: int, now: float) -> None:
+        """Let an id that rests or is free rest from `now` on."""
         if self.hold(entry_id):
             self.rest(entry_id, now)
         elif entry_id in self.idle:
             self.idle.remove(entry_id)
             self.rest(entry_id, now)
-        return True
 
     def next_free(self) -> float:
         """Time at which an id will be free; −inf: now; +inf: not before an id starts to rest."""
@@ -104,13 +101,11 @@ class TopicEntryIds:
         ids = self._by_topic.get(channel)
         return 0 if ids is None else ids.taken[entry_id]
 
-    def rest_again(self, channel: int, entry_id: int, taken: int, start: float) -> bool:
-        """Let an entry id rest anew, as a fragment under it is repeated at `start`.
-
-        False if the id was taken again since it was taken `taken` times.
-        """
+    def rest_again(self, channel: int, entry_id: int, start: float) -> None:
+        """Let an entry id rest anew, as a fragment under it is repeated at `start`."""
         ids = self._by_topic.get(channel)
-        return ids is not None and ids.rest_again(entry_id, taken, start)
+        if ids is not None:
+            ids.rest_again(entry_id, start)
 
     def not_left(self, messages: Iterable[Outgoing]) -> None:
         """Hold the ids of `messages`, whose fragments leave later than planned."""

@@ -90,12 +90,12 @@ class Outbox:
 
     def next_relayed(self, first: Qos | None = None) -> int | None:
         """Probable source of the next PDU, or of the next one of class `first`; None: our own."""
-        levels = self.levels if self.relays else []
-        for level in [each for each in levels if first is None or each.qos is first][:1]:
-            head = level.lanes[0].head
-            if head is not None and head.is_whole:
-                return head.src
-        return None
+        if not self.relays:
+            return None
+        levels = (each for each in self.levels if first is None or each.qos is first)
+        level = next(levels, None)
+        head = None if level is None else level.lanes[0].head
+        return head.src if head is not None and head.is_whole else None
 
     def served(self, lane: Lane) -> None:
         """Move a lane that gave an entry behind its equals, or remove it if it is empty."""

@@ -148,30 +148,11 @@ class Receipts:
             fate, reason = DELIVERED, ""
         elif reason in EXPIRED:
             fate = "expired"
-        self._verdicts.append(
-            Verdict(
-                message.receipt,
-                message.topic_id,
-                dst,
-                fate,
-                reason,
-                age_s,
-                left,
-                message.n_repeats,
-            )
-        )
+        self._verdicts.append(_verdict(message, dst, fate, reason, age_s, left))
 
     def _give_up(self, pending: _Pending) -> None:
-        message = pending.message
         self._verdicts += [
-            Verdict(
-                message.receipt,
-                message.topic_id,
-                dst,
-                "unknown",
-                left=left,
-                repeats=message.n_repeats,
-            )
+            _verdict(pending.message, dst, "unknown", "", None, left)
             for left, dst in _counted_down(pending.awaited)
         ]
 
@@ -183,6 +164,13 @@ class Receipts:
             self._pending[key] = left
         else:
             del self._pending[key]
+
+
+def _verdict(
+    message: Outgoing, dst: int, fate: str, reason: str, age_s: float | None, left: int
+) -> Verdict:
+    ids = message.receipt, message.topic_id
+    return Verdict(*ids, dst, fate, reason, age_s, left, message.n_repeats)
 
 
 def _key(message: Outgoing) -> tuple[int, int]:

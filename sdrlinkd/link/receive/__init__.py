@@ -27,6 +27,7 @@ from sdrlinkd.link.receive.latency import Latency, Parts
 from sdrlinkd.link.receive.neighbors import LONGEST_GAP_S, PRESENT_S, Neighbor, Neighbors
 from sdrlinkd.link.receive.reception import Reception
 from sdrlinkd.link.receive.relay import Relay, RelayParams
+from sdrlinkd.link.receive.repeated import can_be_true
 
 __all__ = [
     "CDR_HEADER_SIZE",
@@ -54,4 +55,5 @@ __all__ = [
     "RelayParams",
     "Retain",
     "SequenceTrack",
+    "can_be_true",
 ]

@@ -50,6 +50,10 @@ class Completion:
         for message in self.undeclared.of_source(src):
             self._end(message, "rx_unknown_topic", now, events)
 
+    def begin_anew(self) -> None:
+        """Go on with another clock; what came before says nothing about the order."""
+        self._newest_at.clear()
+
     def expire(self, now: float, events: list[Event]) -> None:
         """Drop the messages whose topics were not declared in time."""
         for message in self.undeclared.expire(now):

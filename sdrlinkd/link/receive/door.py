@@ -9,13 +9,11 @@ from sdrlinkd.link.receive.neighbors import Neighbors
 from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import RxLedger
 from sdrlinkd.sealing import InTheClear, Opened, Sealing
-from sdrlinkd.wire import is_sealed
+from sdrlinkd.wire import SEQ, SRC, is_sealed
 
 WAIT_S = 2.0
 """Time in s for which PDUs wait for the proof of their source, and for which a schedule of a robot
 that is not proven is followed."""
-SEQ = 3
-"""Index of the octet with the sequence number."""
 MOST_WAITING = 512
 """Most PDUs of one source that wait."""
 
@@ -89,7 +87,7 @@ class Door:
             opened = self._opener.open(data, at, at - first_at)
         except PduError as error:
             self._refuse(error.reason)
-            neighbor = self._neighbors.get(data[1]) if error.reason == "rx_dup" else None
+            neighbor = self._neighbors.get(data[SRC]) if error.reason == "rx_dup" else None
             if neighbor is not None:
                 neighbor.count_duplicate()
             return []
@@ -132,12 +130,12 @@ class Door:
 
     def _first(self, data: bytes, at: float) -> tuple[int | None, float]:
         """(number of a PDU that its source repeats, when it would have come at first)."""
-        neighbor = self._neighbors.get(data[1]) if self._repeated and len(data) > SEQ else None
-        if neighbor is not None:
-            repeated = self._repeated.find(data[1], data[SEQ], at, neighbor.track)
-            if repeated is not None:
-                return repeated
-        return None, at
+        if not self._repeated or len(data) <= SEQ:
+            return None, at
+        neighbor = self._neighbors.get(data[SRC])
+        if neighbor is None:
+            return None, at
+        return self._repeated.find(data[SRC], data[SEQ], at, neighbor.track) or (None, at)
 
     def _may_schedule(self, src: int, now: float) -> bool:
         return now < self._schedules_until.setdefault(src, now + WAIT_S)

@@ -46,6 +46,7 @@ class SequenceTrack:
         self.fills = False
         """Whether it was missing before."""
         self.restarts = 0
+        """How often the source seems to have restarted."""
         # By number: what distinguishes the PDU from others with its sequence number, when it came,
         # and the earliest time at which it may have come first; in the order of arrival.
         self._seen: dict[int, tuple[int, float, float]] = {}
@@ -73,8 +74,8 @@ class SequenceTrack:
         """Note a PDU that came at `at`; False if it is a duplicate.
 
         `told`: its PDU number, if that was told. `first_at`: when it would have come at first, if
-        it is repeated. In place of its CRC, a sealed PDU has its T, which
-        no other PDU with its sequence number has.
+        it is repeated. In place of its CRC, a sealed PDU has its T, which no other PDU with its
+        sequence number has.
         """
         self.skipped, self.fills = NOTHING, False
         if self._order:

@@ -25,6 +25,7 @@ from sdrlinkd.wire import (
     CONTROL_TOPIC_ID,
     PARTS,
     PDU_NUMBERS,
+    SEQ,
     Beacon,
     Clock,
     Entry,
@@ -65,6 +66,7 @@ class Inbox:
         completion: Completion,
         repeated: RepeatedPdus,
         own_pdus: OwnPdus,
+        commands: RecentCommands,
         clear_size: int,
     ) -> None:
         self._own_pdus = own_pdus
@@ -87,7 +89,7 @@ class Inbox:
         self._reassembly = Reassembly(limits)
         self._ages = Ages(reassembly.timeout_s)
         self._ledger = ledger
-        self._commands = RecentCommands(acceptance, topics)
+        self._commands = commands
 
     def hear(self, admitted: Admitted, now: float) -> list[Event]:
         """Take a PDU and return the events that follow from it."""
@@ -117,10 +119,9 @@ class Inbox:
         told, repeated_at = read.told, None
         if admitted.number is not None:
             told, repeated_at = admitted.number, first_at
-        if not track.heard(*key[1:], at, told, is_sealed=key[0], first_at=repeated_at):
+        is_known = admitted.ticks is None and self._commands.has_heard(pdu, admitted.raw, at)
+        if is_known or not track.heard(*key[1:], at, told, is_sealed=key[0], first_at=repeated_at):
             neighbor.count_duplicate()
-            return self._drop("rx_dup", events)
-        if admitted.ticks is None and self._commands.has_heard(pdu, admitted.raw, at):
             return self._drop("rx_dup", events)
         neighbor.count_new(pdu.hop, is_repaired=track.fills and admitted.number is not None)
         if track.fills and not is_relayed and track.is_numbered:
@@ -207,7 +208,7 @@ class Inbox:
         """(whether T makes it unique, sequence number, T or CRC) of a PDU."""
         data = admitted.data
         if admitted.ticks is not None:
-            return True, data[3], admitted.ticks
+            return True, data[SEQ], admitted.ticks
         return False, *(lasting_identity(data) if read.stamps else identity(data))[1:]
 
     def _drop(self, reason: str, events: list[Event]) -> list[Event]:

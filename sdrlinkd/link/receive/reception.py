@@ -13,7 +13,7 @@ from sdrlinkd.link.receive.events import Event
 from sdrlinkd.link.receive.handover import AgeReport, Handover
 from sdrlinkd.link.receive.inbox import Inbox
 from sdrlinkd.link.receive.neighbors import Neighbors
-from sdrlinkd.link.receive.recorded import OwnPdus
+from sdrlinkd.link.receive.recorded import OwnPdus, RecentCommands
 from sdrlinkd.link.receive.relay import Relay, RelayParams
 from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import RxLedger
@@ -57,11 +57,14 @@ class Reception:
         """What this robot sent lately."""
         repeated = self._repeated = RepeatedPdus()
         self._door = Door(sealing, self._acceptance, self._ledger, self.neighbors, repeated)
-        completion = Completion(topics, self._acceptance, self._ledger, self.neighbors)
+        self._commands = RecentCommands(self._acceptance, topics)
+        completion = self._completion = Completion(
+            topics, self._acceptance, self._ledger, self.neighbors
+        )
         self._inbox = Inbox(
             params, reassembly, registry, own_id, hears_self, self.neighbors, self._relay,
             self._acceptance, self._ledger, topics, completion, repeated,
-            self.own_pdus, clear_size,
+            self.own_pdus, self._commands, clear_size,
         )  # fmt: skip
         self._handover = Handover()
         self._air = AirHeard()
@@ -91,6 +94,9 @@ class Reception:
     def begin_anew(self) -> None:
         """Go on with another clock; what was heard lately is not known again."""
         self._repeated.clear()
+        self._commands.begin_anew()
+        self.own_pdus.begin_anew()
+        self._completion.begin_anew()
         for neighbor in self.neighbors:
             neighbor.track.begin_anew()
 

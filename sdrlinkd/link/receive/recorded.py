@@ -44,6 +44,11 @@ class RecentCommands:
         order.append((at, digest))
         return False
 
+    def begin_anew(self) -> None:
+        """Go on with another clock; what was heard lately is not known again."""
+        self._seen.clear()
+        self._order.clear()
+
 
 class OwnPdus:
     """What we sent lately, to tell echoes and relayed copies of it from another robot's PDUs."""
@@ -61,6 +66,10 @@ class OwnPdus:
             if any(pdu[:4] + pdu[5:10] == begin for pdu in burst):
                 return
         self._foreign.append(at)
+
+    def begin_anew(self) -> None:
+        """Go on with another clock; what was heard lately is forgotten."""
+        self._foreign.clear()
 
     def has_double(self, now: float) -> bool:
         """Whether another robot was heard lately that has our id."""

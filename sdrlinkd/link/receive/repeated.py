@@ -2,21 +2,25 @@
 
 from typing import NamedTuple
 
+from sdrlinkd.link.packing import MAX_PDUS
 from sdrlinkd.link.receive.duplicates import SequenceTrack
 from sdrlinkd.wire import PDU_NUMBERS, REPEAT_UNIT_S, Repeat
 
 LONGEST_HELD_S = 2.0
 """Longest time in s between a PDU and its repetition that is believed."""
-MOST_PDUS = 63
 SAME_BURST_S = 5e-3
 """Largest difference in s between the times of two PDUs of one burst; a radio tells no difference,
 datagrams come one after the other."""
-
-
 NEAR = 128
 """How far behind the newest one a PDU that comes in a later burst may be."""
 LATER_S = 0.5
 """Time in s for which an announcement counts in later bursts."""
+
+
+def can_be_true(repeat: Repeat) -> bool:
+    """Whether a REPEAT names as many PDUs as a burst holds, and no time that is too long."""
+    is_recent = repeat.held_100us * REPEAT_UNIT_S <= LONGEST_HELD_S
+    return is_recent and 0 < repeat.n_pdus <= MAX_PDUS
 
 
 class Repeated(NamedTuple):
@@ -45,18 +49,18 @@ class RepeatedPdus:
         Only what a robot says of its own PDUs counts.
         """
         node, number, held, n_pdus = repeat
-        held_s = held * REPEAT_UNIT_S
         if node != src:
             return True
-        if held_s > LONGEST_HELD_S or not 0 < n_pdus <= MOST_PDUS:
+        if not can_be_true(repeat):
             track.distrust()
             return False
         burst_at, told = self._by_src.get(node, (at, {}))
         if abs(at - burst_at) > SAME_BURST_S:
             told = {}
+        first_at = at - held * REPEAT_UNIT_S
         for i in range(n_pdus):
             each = (number + i) % PDU_NUMBERS
-            told[each & 0xFF] = Repeated(each, at - held_s)
+            told[each & 0xFF] = Repeated(each, first_at)
         self._by_src[node] = at, told
         return True
 

@@ -12,12 +12,7 @@ from sdrlinkd.link.repeat.group import RepeatGroup, Wanted
 from sdrlinkd.link.repeat.kept import Kept, KeptPdus, is_lasting
 from sdrlinkd.link.repeat.params import RepeatParams
 from sdrlinkd.reports import RepeatReport
-from sdrlinkd.wire import (
-    BROADCAST,
-    PDU_NUMBERS,
-    Need,
-    Repeat,
-)
+from sdrlinkd.wire import BROADCAST, PDU_NUMBERS, Need, Repeat
 
 UNION_S = 0.01
 """Time in s for which a PDU to everyone waits, so that one repetition serves all who ask."""
@@ -100,9 +95,10 @@ class Answers:
             if told is None or (is_postponed and not is_lasting(octets)):
                 continue
             kept = self._kept.keep(told, octets, inner or octets, mcs, qos, messages, start)
-            if not is_relayed:
+            if is_relayed:
+                self._newest[kept.src] = max(self._newest[kept.src], told)
+            else:
                 self._next_number = told + 1
-            self._newest[kept.src] = max(self._newest[kept.src], told)
             if qos in self._twice and any(_is_short_lived(each) for each in messages):
                 self.wanted[kept.src, told] = Wanted(kept, start + TWICE_AFTER_S)
 
@@ -110,6 +106,7 @@ class Answers:
         """Take a question that came at `at`, from one of `n_others` robots that hear us."""
         if not self.is_on:
             return
+        n_of_asker = sum(asker in each.askers for each in self.wanted.values())
         for number in need.numbers():
             self._asked += 1
             kept = self._kept.find(need.node, number)
@@ -125,12 +122,12 @@ class Answers:
                 continue
             known = self.wanted.get(key)
             if known is None:
-                n_of_asker = sum(asker in each.askers for each in self.wanted.values())
                 if len(self.wanted) >= MOST_WAITING or n_of_asker >= MOST_OF_ONE:
                     self._refused += 1
                     continue
                 for_all = kept.dst == BROADCAST and n_others > 1
                 known = self.wanted[key] = Wanted(kept, at + UNION_S * for_all)
+            n_of_asker += asker not in known.askers
             known.askers.add(asker)
 
     def others_repeat(self, repeat: Repeat, pdu_s: float, at: float) -> None:

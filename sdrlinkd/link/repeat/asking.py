@@ -72,6 +72,10 @@ class _Source:
     def again_s(self) -> float:
         return min(max(2 * self.answer_s, LEAST_AGAIN_S), MOST_AGAIN_S)
 
+    def alone_at(self, times: list[float]) -> float:
+        """When a question about PDUs to be asked for at `times` gets a PDU of its own."""
+        return min(times) + ALONE_S / len(times) if self.useful > USEFUL else inf
+
 
 class Asking:
     """The PDUs that are missing, by source, and when to ask for them.
@@ -158,13 +162,12 @@ class Asking:
     @property
     def offered_alone_at(self) -> float:
         """From when the questions returned last have a PDU of their own; infinity: never."""
-        alone_at = [
-            min(self._sources[src].missing[number].next_at for number in numbers)
-            + ALONE_S / len(numbers)
-            for src, numbers in self._offered
-            if self._sources[src].useful > USEFUL
-        ]
-        return max(min(alone_at, default=inf), self._free_at)
+        alone_at = inf
+        for src, numbers in self._offered:
+            source = self._sources[src]
+            times = [source.missing[number].next_at for number in numbers]
+            alone_at = min(alone_at, source.alone_at(times))
+        return max(alone_at, self._free_at)
 
     def asked(self, start: float, waiting: Collection[int], alone_s: float) -> None:
         """Note that the questions returned last are in a burst at `start`.
@@ -262,9 +265,8 @@ class Asking:
                 times = [each.next_at for each in source.missing.values()]
                 next_at = min(times)
                 self.due_at = min(self.due_at, next_at)
-                if source.useful > USEFUL and next_at < inf:
-                    n = sum(at <= next_at + PATIENCE_S for at in times)
-                    self.alone_at = min(self.alone_at, next_at + ALONE_S / n)
+                together = [at for at in times if at <= next_at + PATIENCE_S]
+                self.alone_at = min(self.alone_at, source.alone_at(together))
         self.alone_at = max(self.alone_at, self._free_at)
 
 

@@ -10,7 +10,10 @@ from sdrlinkd.link.queue import Outgoing
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
+    DST,
+    HOP,
     PARTS,
+    SRC,
     Parity,
     Stamp,
     is_sealed,
@@ -48,12 +51,12 @@ class Kept(NamedTuple):
     @property
     def is_relayed(self) -> bool:
         """Whether another robot is its source."""
-        return bool(self.carried) and self.carried[0].is_whole
+        return self.carried[0].is_whole
 
     @property
     def dst(self) -> int:
         """The robot that it is for."""
-        return self.octets[2]
+        return self.octets[DST]
 
     def expires_at(self) -> float:
         """When all messages in it have outlived their lifespans."""
@@ -61,7 +64,7 @@ class Kept(NamedTuple):
 
     def is_for(self, robot: int) -> bool:
         """Whether a robot may need it: as its destination, or to relay it."""
-        return self.dst in (BROADCAST, robot) or self.octets[4] >> 4 > 1
+        return self.dst in (BROADCAST, robot) or self.octets[HOP] >> 4 > 1
 
 
 class KeptPdus:
@@ -97,7 +100,7 @@ class KeptPdus:
                     # Parity, or an age that went ahead.
                     ids.append(told)
             fragments = [(*each, self._entry_ids.times_taken(*each)) for each in ids]
-        kept = Kept(octets[1], number, octets, start, mcs, qos, carried, fragments)
+        kept = Kept(octets[SRC], number, octets, start, mcs, qos, carried, fragments)
         key = kept.src, number
         if key not in self._kept:
             self._order.append(kept)
@@ -125,9 +128,10 @@ class KeptPdus:
 
     def forget_source(self, src: int) -> None:
         """Forget the PDUs of a robot that has restarted."""
-        for key in [key for key in self._kept if key[0] == src]:
-            self._order.remove(kept := self._kept.pop(key))
-            self._n_bytes -= len(kept.octets)
+        if any(key[0] == src for key in self._kept):
+            self._kept = {key: each for key, each in self._kept.items() if key[0] != src}
+            self._order = deque(each for each in self._order if each.src != src)
+            self._n_bytes = sum(len(each.octets) for each in self._order)
 
     def may_repeat(self, kept: Kept) -> bool:
         """Whether no other message uses an entry id in a PDU by now."""
@@ -138,8 +142,8 @@ class KeptPdus:
 
     def renew_ids(self, kept: Kept, start: float) -> None:
         """Let the entry ids in a PDU rest from `start` on, when it is repeated."""
-        for each in kept.fragments:
-            self._entry_ids.rest_again(*each, start)
+        for channel, entry_id, _ in kept.fragments:
+            self._entry_ids.rest_again(channel, entry_id, start)
 
 
 def is_lasting(octets: bytes) -> bool:

@@ -1,6 +1,6 @@
 """Explains what happens to a topic's messages, in plain sentences."""
 
-from collections.abc import Collection, Hashable, Iterable
+from collections.abc import Callable, Collection, Hashable, Iterable
 from math import inf
 from typing import NamedTuple
 
@@ -50,14 +50,14 @@ class Why:
         self._began_at = float("inf")
         self._meter = RateMeter(MINUTE_S, STEP_S)
 
-    def sample(self, now: float, topics: Iterable[int], air: AirUse) -> None:
+    def sample(self, now: float, topics: Iterable[int], air: Callable[[], AirUse]) -> None:
         """Sample all counters at `now`, if the last sample is some seconds old.
 
         `topics` are the ids of all topics.
         """
         self._began_at = min(self._began_at, now)
         if self._meter.is_due(now):
-            self._meter.sample(self._counters(topics, air), now)
+            self._meter.sample(self._counters(topics, air()), now)
 
     def explain(self, topic_id: int, name: str, told: Told, now: float, air: AirUse) -> list[str]:
         """What happens to a topic's messages and why, in plain sentences."""

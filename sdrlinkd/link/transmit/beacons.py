@@ -37,10 +37,7 @@ class Beacons:
         """The records of a beacon in a burst that leaves at `start`: our identity, and how well we
         hear each of `neighbors`.
         """
-        records: list[Record] = [
-            Beacon(self.boot_id, self._number, self._told),
-            self._digest,
-        ]
+        records: list[Record] = [Beacon(self.boot_id, self._number, self._told), self._digest]
         self._number = (self._number + 1) & 0xFFFF
         self.due_at = start + self._period_s * self._rng.uniform(1 - JITTER, 1 + JITTER)
         for src, snr_db, per in neighbors.take_qualities():

@@ -4,11 +4,10 @@ It handles several kinds of records: beacons (with digest, link reports and WAIT
 the access policy (FRAME), clocks (CLOCK), RECEIPTs, declarations (TOPIC), what consumers here
 subscribe to (WANTED), the PDUs that we lack (NEED), and the proof that we are alive (CONTACT). Each
 record is made when it is due, uses spare room in a broadcast PDU, and from a certain time on gets
-its own PDU. Such a PDU
-takes airtime from messages, and a half-duplex radio is deaf while it sends. So PDUs that hold only
-records take at most `clock.share` of the airtime, all robots together: with n robots, each sends at
-most one such PDU every n · pdu_s / share. This limits beacons, too, unless rate control or a
-schedule depends on them. Declarations have a share of their own.
+its own PDU. Such a PDU takes airtime from messages, and a half-duplex radio is deaf while it sends.
+So PDUs that hold only records take at most `clock.share` of the airtime, all robots together: with
+n robots, each sends at most one such PDU every n · pdu_s / share. This limits beacons, too, unless
+rate control or a schedule depends on them. Declarations and questions have shares of their own.
 """
 
 from math import inf

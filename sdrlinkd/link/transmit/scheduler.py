@@ -10,7 +10,6 @@ sent again, unchanged except for the ages inside, before a new one is composed.
 """
 
 from collections import Counter
-from collections.abc import Sequence
 from functools import partial
 from itertools import chain
 from math import inf
@@ -21,7 +20,7 @@ from sdrlinkd.link.packing import MAX_PDUS, BuiltPdu, Composer
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outbox
 from sdrlinkd.link.receive import PduHeard
-from sdrlinkd.link.repeat import Answers, RepeatGroup
+from sdrlinkd.link.repeat import Answers
 from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
 from sdrlinkd.link.traits import Opportunity
 from sdrlinkd.link.transmit.burst import Burst, Outcome
@@ -29,6 +28,7 @@ from sdrlinkd.link.transmit.control_records import ControlRecords
 from sdrlinkd.link.transmit.fit import Fit
 from sdrlinkd.link.transmit.overheard import Knows, Overheard
 from sdrlinkd.link.transmit.rate import HeardThere
+from sdrlinkd.link.transmit.repetitions import Repetitions
 from sdrlinkd.link.transmit.report import TransmitReport
 from sdrlinkd.link.transmit.retry import RetryQueue
 from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
@@ -97,6 +97,7 @@ class BurstScheduler:
         self._shares = Shares(classes)
         self._limits = Limits(classes, forecasts)
         self._held = _NOT_HELD
+        self._repetitions = Repetitions(answers, composer, sealing)
         self._has_repeated = False
         """Whether the last burst was a repeat."""
         self._ready_at: float | None = None
@@ -209,21 +210,21 @@ class BurstScheduler:
         is_sent = outcome is Outcome.SENT
         if not is_sent:
             self._access.not_sent(burst.start)
-        is_late = outcome is Outcome.LATE
-        if burst.repeated is not None:
-            self._settle_repeated(burst, burst.repeated, now, is_sent=is_sent)
-            return
-        if is_late and self._retry.give_back(burst, now):
+        is_late, repeated = outcome is Outcome.LATE, burst.repeated
+        if is_late and repeated is None and self._retry.give_back(burst, now):
             self._entry_ids.not_left(chain.from_iterable(burst.carried))
             return
         if is_sent:
-            if burst.clock is not None:
-                self._control_records.left(burst.clock, burst.start)
-            self._tx_delays.left(burst)
             self.airtime_s += burst.airtime_s
             self._bursts_by_mcs[burst.mcs] += 1
             self._bursts_sent += 1
             self._pdus_sent += len(burst.pdus)
+            if repeated is not None:
+                self._answers.left(repeated, burst.airtime_s)
+                return
+            if burst.clock is not None:
+                self._control_records.left(burst.clock, burst.start)
+            self._tx_delays.left(burst)
             self._lives.left(burst.carried)
             planned = burst.start if burst.planned_start is None else burst.planned_start
             self._answers.sent(
@@ -233,6 +234,9 @@ class BurstScheduler:
             return
         self._bursts_failed += 1
         self._pdus_failed += len(burst.pdus)
+        if repeated is not None:
+            self._answers.not_left(repeated, now)
+            return
         reason = "tx_expired" if is_late and burst.is_in_vain(now) else "tx_radio_failed"
         for message in self._lives.failed(burst.carried, reason):
             self._composer.abandon(message.lane, now)
@@ -318,99 +322,24 @@ class BurstScheduler:
         return burst._replace(latest=latest)
 
     def _repeat(self, opportunity: Opportunity, qos: Qos) -> Burst | None:
-        """A burst with PDUs of class `qos` that others lack; None if it cannot leave now.
-
-        Our own come after a PDU that says how old they are. Those of others are forwarded again.
-        """
-        earliest, airtime_s, _, sensed, _ = opportunity
-        answers = self._answers
-        group = answers.group(earliest, MAX_PDUS - 1)
-        if group is None:
+        """A burst with PDUs of class `qos` that others lack; None if it cannot leave now."""
+        repetitions, access = self._repetitions, self._access
+        planned = repetitions.plan(opportunity, qos, access)
+        if planned is None:
             return None
-        mcs, announced = group.mcs, group.announced
-        n_told = 0 if group.is_relayed or announced else 1
-        slot = self._access.slot(Wish(earliest, qos, airtime_s(mcs, 1 + n_told), sensed))
-        if slot is None and self._access.keeps_schedule:
-            # Slots may be made for one PDU, or for faster bursts.
-            mcs = group.kept[0].mcs
-            slot = self._access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed))
-        if slot is None or (self._sealing.is_on and not self._may_seal(slot.start, 1)):
+        slot = planned.slot
+        if self._sealing.is_on and not self._may_seal(slot.start, 1):
             return None
-        start, room_s = slot.start, slot.end - slot.start
-        group = group.alive(start)
-        if not group.kept:
+        most = self._allowance(slot, planned.mcs, opportunity, qos).most[qos]
+        burst = repetitions.burst(planned, most, opportunity.airtime_s, self._ready_at)
+        if burst is None:
             return None
-        most = self._allowance(slot, mcs, opportunity, qos).most[qos]
-        if most < 1 or airtime_s(mcs, 1) > room_s:
-            return None
-        if n_told and (most < 2 or airtime_s(mcs, 2) > room_s):
-            return self._announce(group.first(most), mcs, slot, airtime_s(mcs, 1))
-        group = group.first(min(most - n_told, announced or MAX_PDUS))
-        if group.is_relayed:
-            forwarded = self._composer.forwarded
-            pdus = [forwarded(kept.octets, start - kept.first_at) for kept in group.kept]
-        else:
-            pdus = []
-            if n_told:
-                repeats, group = group.told(start, self._composer.k_single)
-                pdus = self._made(repeats, start)
-            pdus += [kept.octets for kept in group.kept]
-        length_s = airtime_s(mcs, len(pdus))
-        answers.took(group, start, length_s)
-        self._spend(length_s, [qos] * len(pdus))
-        self._access.sent(start + length_s, self._relayed_src(pdus))
-        ready_at, self._ready_at = self._ready_at, None
+        self._spend(burst.airtime_s, burst.classes)
+        access.sent(burst.start + burst.airtime_s, self._relayed_src(burst.pdus))
+        if burst.repeated is not None:
+            self._ready_at = None
         self._number += 1
-        return Burst(
-            pdus,
-            [[] for _ in pdus],
-            [qos] * len(pdus),
-            mcs,
-            qos,
-            start,
-            max(start, slot.late_end - length_s),
-            length_s,
-            self._number,
-            first_start=start,
-            ready_at=ready_at or start,
-            n_timed=len(pdus) if group.is_relayed else n_told,
-            repeated=group,
-        )
-
-    def _announce(self, group: RepeatGroup, mcs: int, slot: Slot, length_s: float) -> Burst:
-        """A burst of a PDU that announces repetitions, where there is no room for both."""
-        start = slot.start
-        repeats, group = group.told(start, self._composer.k_single)
-        number = self._composer.next_number
-        pdus = self._made(repeats, start)
-        self._answers.announced(group, start, length_s)
-        self._spend(length_s, [group.qos])
-        self._access.sent(start + length_s, None)
-        self._number += 1
-        return Burst(
-            pdus, [[]], [group.qos], mcs, group.qos, start, max(start, slot.late_end - length_s),
-            length_s, self._number, first_start=start, n_records=1, ready_at=start, n_timed=1,
-            numbers=[number],
-        )  # fmt: skip
-
-    def _made(self, records: Sequence[Record], start: float) -> list[bytes]:
-        """A PDU with these records, for the air."""
-        pdus = [pdu.data for pdu in self._composer.fill_with_records(start, records)]
-        return self._sealed(pdus, start)[0] if self._sealing.is_on else pdus
-
-    def _settle_repeated(
-        self, burst: Burst, group: RepeatGroup, now: float, *, is_sent: bool
-    ) -> None:
-        if not is_sent:
-            self._bursts_failed += 1
-            self._pdus_failed += len(burst.pdus)
-            self._answers.not_left(group, now)
-            return
-        self._answers.left(group, burst.airtime_s)
-        self.airtime_s += burst.airtime_s
-        self._bursts_by_mcs[burst.mcs] += 1
-        self._bursts_sent += 1
-        self._pdus_sent += len(burst.pdus)
+        return burst._replace(number=self._number)
 
     def _may_seal(self, start: float, n: int) -> bool:
         """Whether there are numbers for `n` PDUs of ours in a burst at `start`."""
