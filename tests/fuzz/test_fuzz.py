@@ -5,9 +5,11 @@ from random import Random
 
 import pytest
 
+from sdrlinkd.errors import PduError
+from sdrlinkd.wire import Need, parse, read_control_entries
 from tests.fuzz.corpus import CORPUS, inputs
 from tests.fuzz.mutate import mutate
-from tests.fuzz.targets import TARGETS
+from tests.fuzz.targets import PDU_SIZE, TARGETS
 from tests.laws import trials
 
 CHANGES = 1500
@@ -22,28 +24,34 @@ def test_each_target_has_a_corpus():
     assert set(inputs()) == set(TARGETS)
 
 
-@pytest.mark.parametrize("name", TARGETS)
-def test_nothing_crashes(name):
+def search(name, target):
+    """Give a target its stored corpus, and changes of it."""
     seeds = stored(name)
     for data in (b"", *seeds):
-        TARGETS[name](data)
+        target(data)
     chance = Random(zlib.crc32(name.encode()))
     n = trials(CHANGES if name not in ("config", "sigmf") else CHANGES // 10)
     for _ in range(n):
         data = chance.choice(seeds)
         for _ in range(chance.randrange(1, 4)):
             data = mutate(name, data, chance)
-        TARGETS[name](data)
+        target(data)
 
 
-def test_a_reader_that_fails_is_found():
-    """The search can fail."""
+@pytest.mark.parametrize("name", TARGETS)
+def test_nothing_crashes(name):
+    search(name, TARGETS[name])
 
-    def search():
-        chance, data = Random(1), stored("records")[0]
-        for _ in range(3000):
-            if b"\x0a" in mutate("records", data, chance):
+
+def test_a_fault_behind_checksum_and_length_is_found():
+    def faulty(data):
+        try:
+            control = read_control_entries(parse(data[:PDU_SIZE], PDU_SIZE))
+        except PduError:
+            return
+        for record in control.records:
+            if isinstance(record, Need) and len(record.bitmap) > 8:
                 raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        search()
+        search("link", faulty)

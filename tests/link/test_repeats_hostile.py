@@ -116,7 +116,7 @@ def test_a_burst_that_left_later_is_repeated_with_its_true_age():
     assert again.repeated is not None
     link.confirm(again, Outcome.SENT, 1.22)
     delivered = [each for pdu in again.pdus for each in robot.hear(pdu, 1.22)]
-    ((message_again,),) = (delivered,)
+    (message_again,) = delivered
     assert robot.delivered(message_again, 1.22) == pytest.approx(0.22, abs=1e-3)
 
 

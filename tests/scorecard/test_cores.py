@@ -86,9 +86,7 @@ def test_row_8_the_ledger(lasting, figure):
         elif what < 0.9:
             burst = next_burst(link, now)
             if burst is not None:
-                link.confirm(
-                    burst, chance.choice((Outcome.SENT,) * 4 + (Outcome.LATE, Outcome.LOST)), now
-                )
+                link.confirm(burst, chance.choice(OUTCOMES), now)
         else:
             link.handle_timers(now)
         if steps % 500 == 0:
@@ -146,9 +144,7 @@ def test_row_15_numbers_over_restarts(lasting, figure):
     for _ in lasting():
         machine = Machine()
         for _ in range(60):
-            kind = chance.choice(
-                ("send", "send", "send", "time", "late", "disk", "restart", "anew")
-            )
+            kind = chance.choice(EVENTS)
             value = {
                 "send": chance.randrange(1, 200), "time": 3 * chance.random(),
                 "late": chance.random(), "disk": chance.choice(("works", "full", "power cut")),
