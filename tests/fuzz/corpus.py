@@ -10,41 +10,13 @@ from backends.ether import protocol
 from sdrlinkd.link import ClockParams, Outcome, RepeatParams
 from sdrlinkd.pdulink.gnuradio import pmt
 from sdrlinkd.pdulink.gnuradio.pdus import to_gnu_radio
-from sdrlinkd.wire import (
-    Arrival,
-    Beacon,
-    Clock,
-    Contact,
-    Frame,
-    KeyTold,
-    LinkReport,
-    Met,
-    Need,
-    Parity,
-    Receipt,
-    RegistryDigest,
-    Repeat,
-    Stamp,
-    TopicPiece,
-    Waits,
-    Wanted,
-    build_records,
-)
-from tests.fuzz.mutate import Source, one_pdu
+from sdrlinkd.wire import build_records
+from tests.fuzz.mutate import RECORDS, Source, one_pdu
 from tests.fuzz.targets import PDU_SIZE
 from tests.link.world import make_link, next_burst
 
 CORPUS = Path(__file__).parent / "corpus"
 SHIPPED = Path(__file__).parents[2] / "etc"
-RECORDS = (
-    Stamp(1, 2, 3), Stamp(1, 2, 3, asks=True), Beacon(1, 2), Beacon(1, 2, 3),
-    RegistryDigest(bytes(8), b"abc"), LinkReport(2, -3, 4, 5), Receipt(1, 2, 1),
-    Receipt(1, 2, 1, 3, 4, 5), Parity(1, 2, 4, 1, 0, 0, 20, 75, b"parity"), Frame(1, 0, 2, 3),
-    Clock(1, 2, 1, 5, arrivals=(Arrival(2, 3, 40),), pdu_number=9), Waits(1, 85, 85, 85),
-    Need(1, 300, b"\x81"), TopicPiece(16, 7, 0, 1, b"\0\0" + bytes(8) + b"odom\0pkg/msg/Odom"),
-    Wanted(1, b"\x10\x11"), Repeat(1, 300, 12, 2),
-    Contact(bytes(8), (Met(2, bytes(4), 3),)), KeyTold(1, False, bytes(4)),
-)  # fmt: skip
 
 
 def link_inputs() -> list[bytes]:

@@ -6,7 +6,7 @@ from random import Random
 import pytest
 
 from sdrlinkd.errors import PduError
-from sdrlinkd.wire import Need, parse, read_control_entries
+from sdrlinkd.wire import Repeat, parse, read_control_entries
 from tests.fuzz.corpus import CORPUS, inputs
 from tests.fuzz.mutate import mutate
 from tests.fuzz.targets import PDU_SIZE, TARGETS
@@ -45,12 +45,12 @@ def test_nothing_crashes(name):
 
 def test_a_fault_behind_checksum_and_length_is_found():
     def faulty(data):
-        try:
-            control = read_control_entries(parse(data[:PDU_SIZE], PDU_SIZE))
-        except PduError:
-            return
-        for record in control.records:
-            if isinstance(record, Need) and len(record.bitmap) > 8:
+        for at in range(0, len(data), PDU_SIZE):
+            try:
+                control = read_control_entries(parse(data[at : at + PDU_SIZE], PDU_SIZE))
+            except PduError:
+                continue
+            if any(isinstance(record, Repeat) for record in control.records):
                 raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
