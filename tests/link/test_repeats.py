@@ -252,6 +252,21 @@ def test_fragments_come_again_while_their_message_is_waited_for():
     assert sorted(air.numbers(2)) == list(range(20))
 
 
+@pytest.mark.parametrize("parity", [0.0, 0.2])
+def test_what_is_lost_inside_a_long_message_comes_though_that_one_is_complete(parity):
+    """An urgent message goes between two bursts of a long one; each time, all of it is lost."""
+    urgent = Overrides(qos=Qos.URGENT)
+    classes = ClassesParams(default=DefaultParams(parity=parity))
+    air = Air(lost=once(*range(100, 120)), classes=classes)
+    air.run(1.1)
+    for number in range(20):
+        air.submit(1, number, size=6000)
+        air.run(air.now + 0.002)
+        air.submit(1, 100 + number, overrides=urgent)
+        air.run(air.now + 0.2)
+    assert sorted(air.numbers(2)) == [*range(20), *range(100, 120)]
+
+
 def test_parity_that_repairs_a_message_spares_the_question():
     lost_every = 23
     params = {"classes": ClassesParams(default=DefaultParams(parity=0.2))}

@@ -8,9 +8,9 @@ import msgspec
 
 from sdrlinkd.link.receive import PduPlaced
 from sdrlinkd.link.repeat.budget import Budget
+from sdrlinkd.link.repeat.gaps import Message, inside, parts
 from sdrlinkd.reports import RepeatReport
 from sdrlinkd.wire import (
-    CONTROL_TOPIC_ID,
     NEED_OVERHEAD,
     PARTS,
     PDU_NUMBERS,
@@ -46,8 +46,8 @@ Holds = Callable[[int, int, int], bool]
 class _Missing:
     since: float
     next_at: float
-    inside: frozenset[tuple[int, int]]
-    """(topic, entry id) of messages with fragments on both sides of it."""
+    inside: frozenset[Message]
+    """The messages of which it held a part."""
     asks_left: int = ASKS
     others_asked: bool = False
     """Whether another robot has asked for it."""
@@ -216,9 +216,11 @@ class Asking:
 
     def _skipped(self, source: _Source, before: PduPlaced | None, event: PduPlaced) -> None:
         patience_s = RELAYED_PATIENCE_S if source.hears_relays else PATIENCE_S
-        inside = frozenset(_parts(before) & _parts(event)) if before is not None else frozenset()
+        held: frozenset[Message] = frozenset()
         for number in event.skipped[-MOST_MISSING:]:
-            source.missing[number % PDU_NUMBERS] = _Missing(event.at, event.at + patience_s, inside)
+            if before is not None and number == before.number + 1:
+                held = inside(before, event)
+            source.missing[number % PDU_NUMBERS] = _Missing(event.at, event.at + patience_s, held)
         while len(source.missing) > MOST_MISSING:
             del source.missing[next(iter(source.missing))]
             self._given_up += 1
@@ -248,7 +250,7 @@ class Asking:
             return True
         if not missing.inside or source.last is None or now - source.last.at > ALONE_S:
             return False
-        running = _parts(source.last)
+        running = parts(source.last)
         awaits_parity = any(
             message in running and (message[0] == PARTS or message[0] in source.has_parity)
             for message in missing.inside
@@ -268,14 +270,3 @@ class Asking:
                 together = [at for at in times if at <= next_at + PATIENCE_S]
                 self.alone_at = min(self.alone_at, source.alone_at(together))
         self.alone_at = max(self.alone_at, self._free_at)
-
-
-def _parts(event: PduPlaced) -> set[tuple[int, int]]:
-    """(topic, entry id) of the longer messages of which a PDU holds fragments or parity."""
-    pdu, records = event.read.pdu, event.read.records
-    found = {
-        (entry.topic_id, entry.entry_id)
-        for entry in pdu.entries
-        if entry.total > 1 and entry.topic_id != CONTROL_TOPIC_ID
-    }
-    return found | {(each.topic_id, each.entry_id) for each in records if isinstance(each, Parity)}
