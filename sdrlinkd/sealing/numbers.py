@@ -3,7 +3,7 @@
 from math import floor as whole
 from math import inf
 
-from sdrlinkd.wire import N_TICKS, TICKS_PER_S
+from sdrlinkd.wire import N_SEQS, N_TICKS, TICKS_PER_S
 
 RESERVE_S = 60.0
 """Key time in s that is on disk ahead of use."""
@@ -13,7 +13,6 @@ LEAP_S = 30.0
 """Key time in s that a start skips. It is longer than a proof lasts, so that no attacker can pass a
 PDU of one life off as one of another by delaying it (see `peers`)."""
 REMEMBERED_TICKS = 10 * TICKS_PER_S
-N_SEQS = 256
 
 
 class Numbers:
@@ -33,8 +32,8 @@ class Numbers:
         """The largest T given out, or the first that may be."""
         self._last = [-1] * N_SEQS
         """The last T given out with each seq."""
-        self._used: dict[int, int] = {}
-        """The numbers given out lately: a bit for each seq, by T."""
+        self._used: dict[int, bytearray] = {}
+        """The numbers given out lately: a 1 for each seq, by T."""
         self._end = begin
         """The first T that must not be given out."""
         self._then, self._ticks_then = -inf, 0
@@ -106,12 +105,14 @@ class Numbers:
         if self._last[seq] >= ticks or not self.first <= ticks < self._end:
             return None
         self._last[seq] = ticks
-        if ticks in self._used:
-            self._used[ticks] |= 1 << seq
+        used = self._used.get(ticks)
+        if used is not None:
+            used[seq] = 1
             return ticks
         self._then, self._ticks_then = at, ticks
         self.newest = max(self.newest, ticks)
-        self._used[ticks] = 1 << seq
+        self._used[ticks] = used = bytearray(N_SEQS)
+        used[seq] = 1
         while (oldest := next(iter(self._used))) < ticks - REMEMBERED_TICKS:
             del self._used[oldest]
         return ticks
@@ -123,7 +124,8 @@ class Numbers:
         """
         if ticks < max(self.first, self.newest - REMEMBERED_TICKS):
             return False
-        return not self._used.get(ticks, 0) >> seq & 1
+        used = self._used.get(ticks)
+        return used is None or not used[seq]
 
     def _ticks(self, at: float) -> int:
         # Never ahead of the key time: that no PDU seems younger than it is depends on this.

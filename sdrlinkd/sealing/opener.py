@@ -93,21 +93,21 @@ class Opener:
         `later_s`: the time for which its source says that it has been on its way, as it repeats it.
         """
         pdu = parse_sealed(data, self._pdu_size)
-        _, src, dst, seq, kid, ticks, held = pdu
+        _, _, src, dst, seq, hop, kid, ticks, held = pdu
         ciphers = self._keys.by_kid.get(kid)
         if ciphers is None:
             raise self._closed("sec_unknown_kid", src, dst, kid, at)
-        peer = self._peers.of(src)
-        window = peer.window(kid)
+        peer = self._peers.by_src.get(src) or self._peers.of(src)
+        window = peer.windows.get(kid) or peer.window(kid)
         reason = window.judge(ticks, seq)
         if reason:
             if reason == "sec_replay":
                 self._strangers.old(src, at)
             raise PduError(reason, f"number {ticks}, {seq} of robot {src}")
-        text = ciphers.open(pdu)
-        if text is None:
+        inner = ciphers.open(pdu)
+        if inner is None:
             raise self._closed("sec_bad_tag", src, dst, kid, at)
-        inner, is_own = pdu.inner(text), src == self._own_id
+        is_own = src == self._own_id
         lead_s = at - ticks / TICKS_PER_S
         held_s = held * HELD_UNIT_S + later_s
         if peer.note(lead_s, at, kid, self._limit_s):
@@ -121,7 +121,7 @@ class Opener:
             self._look_for_double(kid, ticks, seq)
             if not self._hears_self:
                 raise PduError("rx_own", "our own source id")
-        elif (_CONTACT_MARK in text or _KEY_MARK in text) and _has_records(inner):
+        elif hop & 0x0F > 1 or inner[HEADER_SIZE] >> 4 == CONTROL_TOPIC_ID:
             self._take_records(src, inner, lead_s, held_s, at)
         is_proven = peer.has_proof
         if is_own:
@@ -173,6 +173,8 @@ class Opener:
         self, src: int, inner: bytes, lead_s: float, held_s: float, at: float
     ) -> None:
         """Use the CONTACT and KEY records in an inner PDU, if there are some."""
+        if not (_CONTACT_MARK in inner or _KEY_MARK in inner) or not _has_records(inner):
+            return
         try:
             records = read_control_entries(parse(inner, len(inner), is_intact=True)).records
         except PduError:
@@ -213,8 +215,6 @@ def _aged(inner: bytes, held_s: float) -> bytes:
 def _has_records(inner: bytes) -> bool:
     """Whether a PDU has a control entry."""
     n = inner[HOP] & 0x0F
-    if n == 1:
-        return inner[HEADER_SIZE] >> 4 == CONTROL_TOPIC_ID
     return "f" in inner[HEADER_SIZE : HEADER_SIZE + (n + 1) // 2].hex()
 
 

@@ -5,7 +5,7 @@ from functools import partial
 from math import inf
 from typing import NamedTuple
 
-from sdrlinkd.wire import TICKS_PER_S
+from sdrlinkd.wire import N_SEQS, TICKS_PER_S
 
 WINDOW_TICKS = 2 * TICKS_PER_S
 """T older than the newest by more than this is refused."""
@@ -27,17 +27,24 @@ class Window:
     def __init__(self, oldest: int = 0) -> None:
         self.newest = -1
         self._oldest = oldest
-        self._seen: dict[int, int] = {}
+        # By T: a 1 for each seq.
+        self._seen: dict[int, bytearray] = {}
 
     def judge(self, ticks: int, seq: int) -> str:
         """The ledger's reason to refuse a number; empty if it is new."""
         if ticks < self._oldest:
             return "sec_replay"
-        return "rx_dup" if self._seen.get(ticks, 0) >> seq & 1 else ""
+        seen = self._seen.get(ticks)
+        return "rx_dup" if seen is not None and seen[seq] else ""
 
     def take(self, ticks: int, seq: int) -> None:
         """Note that a PDU with this number was opened."""
-        self._seen[ticks] = self._seen.get(ticks, 0) | 1 << seq
+        seen = self._seen.get(ticks)
+        if seen is not None:
+            seen[seq] = 1
+            return
+        self._seen[ticks] = seen = bytearray(N_SEQS)
+        seen[seq] = 1
         if ticks > self.newest:
             self.newest = ticks
             self._oldest = max(self._oldest, ticks - WINDOW_TICKS)
@@ -73,38 +80,38 @@ class Peers:
 
     def __init__(self, oldest: Callable[[int, int], int]) -> None:
         self._oldest = oldest
-        self._by_src: dict[int, Peer] = {}
+        self.by_src: dict[int, Peer] = {}
 
     def __iter__(self) -> Iterator[tuple[int, "Peer"]]:
-        return iter(self._by_src.items())
+        return iter(self.by_src.items())
 
     def of(self, src: int) -> "Peer":
         """What is known about robot `src`."""
-        peer = self._by_src.get(src)
+        peer = self.by_src.get(src)
         if peer is None:
-            peer = self._by_src[src] = Peer(partial(self._oldest, src))
+            peer = self.by_src[src] = Peer(partial(self._oldest, src))
         return peer
 
     def was_opened(self, src: int) -> bool:
         """Whether a sealed PDU of robot `src` was ever opened in this life."""
-        known = self._by_src.get(src)
+        known = self.by_src.get(src)
         return known is not None and any(each.newest >= 0 for each in known.windows.values())
 
     def change_key(self, kid: int) -> None:
         """Forget the numbers under a kid, which now is another key's."""
-        for peer in self._by_src.values():
+        for peer in self.by_src.values():
             peer.windows.pop(kid, None)
 
     def restart(self) -> None:
         """Forget all proofs and leads, as our own clock begins anew."""
-        for peer in self._by_src.values():
+        for peer in self.by_src.values():
             peer.restart()
 
     def newest(self, kid: int) -> dict[int, int]:
         """The newest T of each source under a key."""
         return {
             src: peer.windows[kid].newest
-            for src, peer in self._by_src.items()
+            for src, peer in self.by_src.items()
             if kid in peer.windows and peer.windows[kid].newest >= 0
         }
 

@@ -136,6 +136,7 @@ from sdrlinkd.wire.sealed import (
     HELD_UNIT_S,
     MIN_SEALED_SIZE,
     N_KIDS,
+    N_SEQS,
     N_TICKS,
     SEAL_OVERHEAD,
     TAG_SIZE,
@@ -146,8 +147,6 @@ from sdrlinkd.wire.sealed import (
     is_sealed,
     leaves_later,
     parse_sealed,
-    seal_number,
-    seal_parts,
 )
 
 __all__ = [
@@ -191,6 +190,7 @@ __all__ = [
     "NEED_OVERHEAD",
     "NO_AGE",
     "N_KIDS",
+    "N_SEQS",
     "N_TICKS",
     "PARITY_OVERHEAD",
     "PARTS",
@@ -283,8 +283,6 @@ __all__ = [
     "pieces",
     "postponed",
     "read_control_entries",
-    "seal_number",
-    "seal_parts",
     "tellable",
     "topic_type",
     "with_seq",

@@ -1,6 +1,7 @@
 """The layout of a sealed PDU (wire document, section 11); the cipher is elsewhere."""
 
 import struct
+from collections.abc import Callable
 from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
@@ -16,58 +17,61 @@ MIN_SEALED_SIZE = MIN_PDU_SIZE + SEAL_OVERHEAD
 N_KIDS = 4
 TICKS_PER_S = 32
 """Units of T in a second."""
+N_SEQS = 256
+"""Values of seq."""
 N_TICKS = 1 << 30
 """Values of T; at the end of them, a key is used up."""
 HELD_UNIT_S = 1e-4
 MAX_HELD = 0xFFFF
-_NUMBER = struct.Struct(">I")
 _HELD = struct.Struct(">H")
 _HEAD = struct.Struct(">BBBBBIH")
-_NUMBER_END = HEADER_SIZE + _NUMBER.size
+_NONCE = struct.Struct(">8xIB")
+_KID_AT = 30
+"""Bit from which on the kid stands in a number."""
+_NUMBER_END = HEADER_SIZE + 4
 _BODY_AT = _HEAD.size
 _SECRET_END = -CRC_SIZE
-_NO_HELD = bytes(_HELD.size)
-_NONCE_BEGIN = bytes(8)
-_OCTETS = tuple(bytes((value,)) for value in range(256))
-_LOW = tuple(bytes((value & 0x0F,)) for value in range(256))
-"""An octet with its high nibble taken as zero, by its value."""
+_COUNT = 0x0F
+"""The bits of the hop octet that stay the same on the way."""
 _CLEAR = tuple(bytes((value & ~FLAG_SEALED,)) for value in range(256))
 _NO_CRC = bytes(CRC_SIZE)
 _make = tuple.__new__
 """Makes a named tuple in half the time that its own constructor takes."""
 
+Cipher = Callable[[bytes, bytes, bytes], bytes]
+"""(nonce, text, associated data) → the text, encrypted or decrypted.
+
+The nonce has seq and the time T; the associated data are what stays the same on the way of the
+octets before the body.
+"""
+
 
 class Sealed(NamedTuple):
     """The fields of a sealed PDU; `held` is in units of 0.1 ms, `ticks` is T in 1/32 s.
 
-    `data` is the whole PDU.
+    `data` is the whole PDU, `first` its first octet, and `hop` the fifth one.
     """
 
     data: bytes
+    first: int
     src: int
     dst: int
     seq: int
+    hop: int
     kid: int
     ticks: int
     held: int
 
-    def parts(self) -> tuple[bytes, bytes, bytes]:
-        """(nonce, associated data, body and tag).
+    def inner(self, decrypt: Cipher) -> bytes:
+        """The inner PDU; its CRC, which the tag makes needless, is left out.
 
-        The associated data are the octets before the body that stay the same on the way.
+        `decrypt` is given body and tag, and raises what it likes.
         """
-        data = self.data
-        number = data[HEADER_SIZE:_NUMBER_END]
-        return (
-            _NONCE_BEGIN + number + data[3:4],
-            data[:HOP] + _LOW[data[HOP]] + number + _NO_HELD,
-            data[_BODY_AT:_SECRET_END],
-        )
-
-    def inner(self, plaintext: bytes) -> bytes:
-        """The inner PDU, from its plaintext; its CRC, which the tag makes needless, is left out."""
-        data = self.data
-        return _CLEAR[data[0]] + data[1:HEADER_SIZE] + plaintext + _NO_CRC
+        data, first, src, dst, seq, hop, kid, ticks, _ = self
+        number = kid << _KID_AT | ticks
+        associated = _HEAD.pack(first, src, dst, seq, hop & _COUNT, number, 0)
+        text = decrypt(_NONCE.pack(number, seq), data[_BODY_AT:_SECRET_END], associated)
+        return b"".join((_CLEAR[first], data[1:HEADER_SIZE], text, _NO_CRC))
 
 
 def is_sealed(data: bytes) -> bool:
@@ -75,30 +79,17 @@ def is_sealed(data: bytes) -> bool:
     return bool(data) and bool(data[0] & FLAG_SEALED)
 
 
-def seal_parts(inner: bytes, number: bytes) -> tuple[bytes, bytes, bytes, bytes]:
-    """(octets before the body, nonce, associated data, plaintext) of an inner PDU, to be sealed.
+def build_sealed(inner: bytes, kid: int, ticks: int, encrypt: Cipher) -> bytes:
+    """The sealed PDU of an inner one; `encrypt` returns body and tag.
 
-    `number` is that of `seal_number`. A nonce must never be used twice.
+    No seq may be used twice with one T and one key.
     """
-    begin = _OCTETS[inner[0] | FLAG_SEALED] + inner[1:HOP]
-    hop = inner[HOP]
-    return (
-        begin + _OCTETS[hop] + number + _NO_HELD,
-        _NONCE_BEGIN + number + inner[3:4],
-        begin + _LOW[hop] + number + _NO_HELD,
-        inner[HEADER_SIZE:-CRC_SIZE],
-    )
-
-
-def seal_number(kid: int, ticks: int) -> bytes:
-    """The octets of kid and T."""
-    return _NUMBER.pack(kid << 30 | ticks)
-
-
-def build_sealed(head: bytes, secret: bytes) -> bytes:
-    """The octets of a sealed PDU, from those before the body, and from body and tag."""
-    body = head + secret
-    return body + crc16(body).to_bytes(CRC_SIZE, "big")
+    first, src, dst, seq, hop = inner[:HEADER_SIZE]
+    number = kid << _KID_AT | ticks
+    first |= FLAG_SEALED
+    associated = _HEAD.pack(first, src, dst, seq, hop & _COUNT, number, 0)
+    secret = encrypt(_NONCE.pack(number, seq), inner[HEADER_SIZE:_SECRET_END], associated)
+    return _with_crc(_HEAD.pack(first, src, dst, seq, hop, number, 0) + secret)
 
 
 def parse_sealed(data: bytes, pdu_size: int) -> Sealed:
@@ -111,13 +102,13 @@ def parse_sealed(data: bytes, pdu_size: int) -> Sealed:
         raise PduError("rx_short", f"{len(data)} bytes where a PDU has {pdu_size}")
     if crc16(data):
         raise PduError("rx_crc", "CRC-16 does not match")
-    first, src, dst, seq, hop_count, number, held = _HEAD.unpack_from(data)
+    first, src, dst, seq, hop, number, held = _HEAD.unpack_from(data)
     if first >> 4 != VERSION:
         raise PduError("rx_version", f"version {first >> 4}, this is version {VERSION}")
-    if not hop_count & 0x0F:
+    if not hop & _COUNT:
         raise PduError("rx_entry", "no entries")
-    fields = (data, src, dst, seq, number >> 30, number & (N_TICKS - 1), held)
-    return _make(Sealed, fields)
+    kid, ticks = number >> _KID_AT, number & (N_TICKS - 1)
+    return _make(Sealed, (data, first, src, dst, seq, hop, kid, ticks, held))
 
 
 def delayed(data: bytes, by_us: int, hops: int = 0) -> bytes:

@@ -8,7 +8,7 @@ import pytest
 
 from sdrlinkd.link import RelayParams
 from sdrlinkd.sealing import SecurityParams
-from sdrlinkd.wire import Contact, delayed, parse, parse_sealed, read_control_entries
+from sdrlinkd.wire import TAG_SIZE, Contact, delayed, parse, parse_sealed, read_control_entries
 from tests.laws import trials
 from tests.sealing.team import KEY, LIFESPAN_S, STEP_S, Robot, Team
 
@@ -147,7 +147,7 @@ def test_a_delay_from_the_first_pdu_on_hides_no_age(make, victim, after_s, lies)
 def has_contact(data):
     """Whether a PDU in the mode auth holds a CONTACT; everyone can see that."""
     pdu = parse_sealed(data, len(data))
-    inner = pdu.inner(pdu.parts()[2][:-8])
+    inner = pdu.inner(lambda _nonce, body, _associated: body[:-TAG_SIZE])
     records = read_control_entries(parse(inner, len(inner), is_intact=True)).records
     return any(isinstance(record, Contact) for record in records)
 
