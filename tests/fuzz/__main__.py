@@ -1,5 +1,6 @@
-"""Fuzzes each target in turn: `python -m tests.fuzz [SECONDS] [TARGET...]`."""
+"""Fuzzes what reads from outside, one target after the other."""
 
+import argparse
 import os
 import re
 import subprocess
@@ -43,11 +44,16 @@ def search(name: str, seconds: int) -> None:
 
 def main(arguments: list[str]) -> int:
     """Fuzz the targets named, or all; returns 1 if an input crashed one."""
-    seconds = int(arguments[0]) if arguments and arguments[0].isdigit() else 60
-    names = [each for each in arguments if not each.isdigit()]
-    names = names or sorted(each.name for each in CORPUS.iterdir())
-    failed = False
-    for name in names:
+    known = sorted(each.name for each in CORPUS.iterdir())
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
+    parser.add_argument("seconds", nargs="?", type=int, default=60, help="time for each target")
+    parser.add_argument("target", nargs="*", help=f"of {', '.join(known)}; default: all")
+    asked = parser.parse_args(arguments)
+    unknown = sorted(set(asked.target) - set(known))
+    if unknown:
+        parser.error(f"no target {', '.join(unknown)}; there are {', '.join(known)}")
+    seconds, failed = asked.seconds, False
+    for name in asked.target or known:
         print(f"{name}: {seconds} s", flush=True)  # noqa: T201
         environment = {**os.environ, "SDRLINK_FUZZ": name}
         done = subprocess.run(
