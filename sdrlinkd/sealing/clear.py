@@ -28,7 +28,7 @@ class ClearOpener:
         self.strangers.closed(pdu.src, pdu.kid, at)
         raise PduError("rx_flags", "sealed (E=1), and this node has no keys")
 
-    def is_late(self, src: int, lead_s: float, held_s: float) -> bool:  # noqa: ARG002  # as in Opener
+    def is_late(self, src: int, at: float, lead_s: float, held_s: float) -> bool:  # noqa: ARG002  # as in Opener
         """Whether a PDU was delayed by more than it says: nothing tells."""
         return False
 

@@ -32,6 +32,8 @@ from sdrlinkd.wire import (
 
 UNCERTAIN = 4
 """Least limit of undetected delays, in uncertainties of the radio's times."""
+JUST_STARTED_S = 2.0
+"""Time in s after a start in which PDUs of before are no attack."""
 _make = tuple.__new__
 """Makes a named tuple in half the time that its own constructor takes."""
 _CONTACT_MARK, _KEY_MARK = bytes((RecordType.CONTACT,)), bytes((RecordType.KEY,))
@@ -123,11 +125,13 @@ class Opener:
                 raise PduError("rx_own", "our own source id")
         elif hop & 0x0F > 1 or inner[HEADER_SIZE] >> 4 == CONTROL_TOPIC_ID:
             self._take_records(src, inner, lead_s, held_s, at)
-        is_proven = peer.has_proof
-        if is_own:
-            is_proven = True
-        elif peer.is_late(lead_s, held_s, self._limit_s, is_judged=is_proven or self._takes_all):
-            self._strangers.late(src, at)
+        is_proven = is_own or peer.proof is not None
+        own_age_s = at - self._peers.began
+        if not is_own and peer.is_late(
+            lead_s, held_s, self._limit_s, own_age_s, is_judged=is_proven or self._takes_all
+        ):
+            if own_age_s > JUST_STARTED_S:
+                self._strangers.late(src, at)
             raise PduError("sec_late", f"held {held_s:g} s, robot {src}")
         window.take(ticks, seq)
         peer.heard_at = at
@@ -135,9 +139,13 @@ class Opener:
             inner = _aged(inner, held_s)
         return _make(Opened, (inner, src, ticks, lead_s, held_s, is_proven))
 
-    def is_late(self, src: int, lead_s: float, held_s: float) -> bool:
-        """Whether a PDU of robot `src`, which is proven, was delayed by more than it says."""
-        return self._peers.of(src).is_late(lead_s, held_s, self._limit_s, is_judged=True)
+    def is_late(self, src: int, at: float, lead_s: float, held_s: float) -> bool:
+        """Whether a PDU of robot `src`, which is proven now, was delayed by more than it says, or
+        may have been sent before this robot started.
+        """
+        own_age_s = at - self._peers.began
+        peer = self._peers.of(src)
+        return peer.is_late(lead_s, held_s, self._limit_s, own_age_s, is_judged=True)
 
     def refuses_clear(self, data: bytes, now: float) -> bool:
         """Whether an intact PDU in the clear is refused; a KEY record in it is noted."""

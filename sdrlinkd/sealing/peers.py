@@ -81,6 +81,8 @@ class Peers:
     def __init__(self, oldest: Callable[[int, int], int]) -> None:
         self._oldest = oldest
         self.by_src: dict[int, Peer] = {}
+        self.began = -inf
+        """When this life of ours began, in s; −inf: that is not known yet."""
 
     def __iter__(self) -> Iterator[tuple[int, "Peer"]]:
         return iter(self.by_src.items())
@@ -104,6 +106,7 @@ class Peers:
 
     def restart(self) -> None:
         """Forget all proofs and leads, as our own clock begins anew."""
+        self.began = -inf
         for peer in self.by_src.values():
             peer.restart()
 
@@ -138,7 +141,8 @@ class Peer:
         """The least lead, in s."""
         self.number: bytes | None = None
         """Its number in CONTACT."""
-        self._proof: Proof | None = None
+        self.proof: Proof | None = None
+        """Its word on its clock, if it was proven when the last PDU was noted."""
         self.first_at = inf
         """When its first PDU since it was proven last, or ever, came, in s."""
         self._kid = -1
@@ -149,7 +153,7 @@ class Peer:
 
     def is_proven(self, now: float) -> bool:
         """Whether it has proven to be alive in this life of ours, and was heard since."""
-        proof = self._proof
+        proof = self.proof
         return proof is not None and now - self.heard_at < SILENT_S and now - proof.at < PROOF_S
 
     def window(self, kid: int) -> Window:
@@ -164,7 +168,7 @@ class Peer:
 
         A delay of less than `-limit_s` shows that the source's clock has begun anew.
         """
-        proof, ended = self._proof, False
+        proof, ended = self.proof, False
         if kid != self._kid:
             # With another key, the source's clock may have begun anew.
             self._kid = kid
@@ -176,37 +180,38 @@ class Peer:
             if lead_s + proof.ahead_s < -limit_s:
                 self.restart()
                 ended = True
-            elif not self.is_proven(at):
-                self._proof, ended = None, True
+            elif at - self.heard_at >= SILENT_S or at - proof.at >= PROOF_S:
+                self.proof, ended = None, True
         self.least.add(lead_s, at)
         if ended or self.first_at == inf:
             self.first_at = at
         return ended
 
-    @property
-    def has_proof(self) -> bool:
-        """Whether it was proven when the last PDU was noted."""
-        return self._proof is not None
-
     def prove(self, proof: Proof) -> None:
         """Note that the source is alive, and how far its clock is ahead of ours."""
-        self._proof, self.heard_at = proof, proof.at
+        self.proof, self.heard_at = proof, proof.at
 
     def restart(self) -> None:
         """Forget what depends on the source's clock, which has begun anew."""
-        self._proof = None
+        self.proof = None
         self.least = Least()
 
-    def is_late(self, lead_s: float, held_s: float, limit_s: float, *, is_judged: bool) -> bool:
+    def is_late(
+        self, lead_s: float, held_s: float, limit_s: float, own_age_s: float, *, is_judged: bool
+    ) -> bool:
         """Whether a PDU's delay differs from `held_s` by more than `limit_s`.
 
-        Of a source that is not proven, only the relation to its other PDUs is known: a delay of
-        these is found only if it `is_judged`.
+        It also is if the PDU may have been sent before this life of ours began, `own_age_s` ago: an
+        earlier one may have heard it. Of a source that is not proven, only the relation to its
+        other PDUs is known: a delay of these is found only if it `is_judged`.
         """
         least_s = lead_s - self.least.value - held_s
         if least_s < -limit_s:
             return True
         if not is_judged:
             return False
-        proof = self._proof
-        return (least_s if proof is None else lead_s + proof.ahead_s - held_s) > limit_s
+        proof = self.proof
+        if proof is None:
+            return least_s > limit_s
+        delay_s = lead_s + proof.ahead_s
+        return delay_s - held_s > limit_s or delay_s > own_age_s

@@ -24,6 +24,8 @@ N_TICKS = 1 << 30
 HELD_UNIT_S = 1e-4
 MAX_HELD = 0xFFFF
 _HELD = struct.Struct(">H")
+_CRC = struct.Struct(">H")
+_BEGIN = struct.Struct(">BBBBB")
 _HEAD = struct.Struct(">BBBBBIH")
 _NONCE = struct.Struct(">8xIB")
 _KID_AT = 30
@@ -84,12 +86,13 @@ def build_sealed(inner: bytes, kid: int, ticks: int, encrypt: Cipher) -> bytes:
 
     No seq may be used twice with one T and one key.
     """
-    first, src, dst, seq, hop = inner[:HEADER_SIZE]
+    first, src, dst, seq, hop = _BEGIN.unpack_from(inner)
     number = kid << _KID_AT | ticks
     first |= FLAG_SEALED
     associated = _HEAD.pack(first, src, dst, seq, hop & _COUNT, number, 0)
     secret = encrypt(_NONCE.pack(number, seq), inner[HEADER_SIZE:_SECRET_END], associated)
-    return _with_crc(_HEAD.pack(first, src, dst, seq, hop, number, 0) + secret)
+    body = _HEAD.pack(first, src, dst, seq, hop, number, 0) + secret
+    return body + _CRC.pack(crc16(body))
 
 
 def parse_sealed(data: bytes, pdu_size: int) -> Sealed:
@@ -125,13 +128,10 @@ def delayed(data: bytes, by_us: int, hops: int = 0) -> bytes:
     # Rounded up, so that many short delays do not vanish.
     later = held - (-max(by_us, 0) // round(1e6 * HELD_UNIT_S))
     _HELD.pack_into(changed, _NUMBER_END, min(later, MAX_HELD))
-    return _with_crc(bytes(changed[:-CRC_SIZE]))
+    body = bytes(changed[:-CRC_SIZE])
+    return body + _CRC.pack(crc16(body))
 
 
 def leaves_later(pdu: bytes, by_us: int) -> bytes:
     """A PDU of our own, with control channel, for a burst that leaves `by_us` µs later."""
     return delayed(pdu, by_us) if is_sealed(pdu) else postponed(pdu, by_us)
-
-
-def _with_crc(body: bytes) -> bytes:
-    return body + crc16(body).to_bytes(CRC_SIZE, "big")

@@ -120,6 +120,40 @@ def test_recordings_gain_nothing(make, victim, restarts):
         assert robot.link.audit() == []
 
 
+def test_what_one_life_has_heard_no_other_one_hears_again():
+    """A message that the recorder plays within its lifespan, to a robot that has just restarted."""
+    team = pair()
+    source, victim = team.robots.values()
+    for robot in team.robots.values():
+        robot.start(0.0)
+    team.run(3.0, lambda _: None)
+    for number in range(60):
+        played_after_s = 0.04 + 0.004 * number
+        recorded = []
+
+        def passes(receiver, data, recorded=recorded):
+            if receiver == victim.id:
+                recorded.append((team.now, data))
+            return True
+
+        team.tamper = passes
+        sent_at = team.now
+        source.link.submit(0, command(number, sent_at), source.clock(sent_at))
+        team.run(0.02, lambda _: None)
+        assert NUMBERED.unpack(victim.heard[-1].payload[len(CDR) :])[0] == number
+        victim.stop()
+        victim.start(team.now)
+        team.tamper = lambda *_: True
+        for at, data in recorded:
+            for lie_s in (-0.12, 0.0, 0.12):
+                held = delayed(data, max(0, round(1e6 * (played_after_s + lie_s))))
+                team.plays_at(at + played_after_s, victim.id, data)
+                team.plays_at(at + played_after_s, victim.id, held)
+        team.run(2.0, lambda _: None)
+    assert judge(victim)["twice"] == 0
+    assert judge(victim)["delivered"] == 60
+
+
 class Delayer:
     """Keeps every PDU from both ends and plays it after `after_s`, from the first one on."""
 

@@ -122,7 +122,7 @@ class Door:
         for pdu, opened in self._waiting.pop(src):
             if now - pdu.at > WAIT_S:
                 self._refuse("sec_unproven")
-            elif self._opener.is_late(src, opened.lead_s, opened.held_s):
+            elif self._opener.is_late(src, pdu.at, opened.lead_s, opened.held_s):
                 self._refuse("sec_late")
             else:
                 released.append(pdu._replace(was_seen=True))
