@@ -256,6 +256,41 @@ class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
     """PDUs dropped, by reason (`tx_*`)."""
 
 
+class RobotLinksReport(msgspec.Struct, frozen=True, kw_only=True):
+    """How well a robot hears others, as the team was told."""
+
+    id: int
+    """Id of the robot."""
+    told_s_ago: float
+    """Time in s since this came."""
+    hears: dict[int, float]
+    """Share of the PDUs of each other robot that it receives directly."""
+
+
+class FlowReport(msgspec.Struct, frozen=True, kw_only=True):
+    """PDUs of one source to one destination that this robot sends or relays."""
+
+    src: int
+    """Id of the robot that they are from."""
+    dst: int
+    """Id of the robot that they are for; 255: everyone."""
+    forwarded_by: list[int]
+    """The robots that are to forward them next."""
+    went_around: int
+    """How often a robot did not answer, so that others were named."""
+
+
+class RoutesReport(msgspec.Struct, frozen=True, kw_only=True):
+    """Links and paths of the team, with `relay.policy = "auto"`."""
+
+    robots: list[RobotLinksReport] = []
+    """The robots of which links are known, in ascending order of ids."""
+    flows: list[FlowReport] = []
+    """What goes through this robot, in ascending order of sources."""
+    going_around: list[int] = []
+    """Robots that did not answer, and that nothing is sent through for some seconds."""
+
+
 class SecurityReport(msgspec.Struct, frozen=True, kw_only=True):
     """Sealed PDUs: the keys, and the robots that have proven to be alive."""
 
@@ -345,6 +380,8 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Sealed PDUs."""
     relayed: RelayReport = RelayReport()
     """PDUs of other robots that this robot relays."""
+    routes: RoutesReport = RoutesReport()
+    """Links and paths of the team."""
     repeats: RepeatReport = RepeatReport()
     """PDUs sent again, and asked for."""
     fragments_repaired: int = 0

@@ -36,6 +36,10 @@ COMMANDS = {
         "Show the latency of each received topic, its causes, and the clocks of the neighbors.",
         ("latency",),
     ),
+    "routes": Listed(
+        "Show who hears whom in the team, and who forwards what goes through this robot.",
+        ("routes",),
+    ),
     "check": Listed(
         "Verify the running daemon's ledger; exit code 1 when it does not add up.", ("status",)
     ),

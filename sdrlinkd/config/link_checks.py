@@ -7,21 +7,27 @@ from zstandard import ZstdCompressionDict, ZstdCompressor, ZstdError
 
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link import Qos, Relay, TopicPolicy
+from sdrlinkd.link import FixedRoutes, Qos, TopicPolicy
 from sdrlinkd.wire import MIN_SEALED_SIZE, Registry
 
 
-def check_relay(config: Config, node_id: int, registry: Registry) -> None:
+def check_relay(config: Config, registry: Registry) -> None:
     """Check that the settings of relays and parity fit the rest of the link.
 
     Raises ConfigError, which begins with the key and says what was given and what is allowed.
     """
-    relay = Relay(config.relay, node_id)
+    is_auto = config.relay.policy == "auto"
+    relays = FixedRoutes(config.relay).is_on or is_auto
     if config.relay.policy == "routes" and not config.relay.routes:
         raise ConfigError(
             'relay.routes: got []; allowed with relay.policy = "routes": FROM>TO, such as "1>3"'
         )
-    if relay.is_on and config.link.hop_limit < 2:
+    if is_auto and not registry.has_control:
+        raise ConfigError(
+            'relay.policy: got "auto"; it needs the control channel, so at most 15 topics; allowed '
+            'here: "none", "routes", "flood"'
+        )
+    if relays and config.link.hop_limit < 2:
         raise ConfigError(
             f"link.hop_limit: got {config.link.hop_limit}; allowed with relay.policy = "
             f'"{config.relay.policy}": at least 2, the same at all robots'

@@ -157,7 +157,7 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
             "rate.adapt: got true; it needs beacons (link.beacon_s) and the control "
             "channel, so at most 15 topics; allowed here: false"
         )
-    check_relay(config, node_id, registry)
+    check_relay(config, registry)
     check_security(config, registry)
     if config.chrony.socket and config.chrony.robot == node_id:
         raise ConfigError(

@@ -35,12 +35,11 @@ from sdrlinkd.link.receive import (
     CDR_HEADER_SIZE,
     NOT_RETAINED,
     Delivered,
-    Relay,
-    RelayParams,
     Retain,
 )
 from sdrlinkd.link.repeat import RepeatParams
 from sdrlinkd.link.report import Names
+from sdrlinkd.link.routes import FixedRoutes, RelayParams
 from sdrlinkd.link.schedule import (
     IDLE_SHARE,
     OVERRUN,
@@ -91,6 +90,7 @@ __all__ = [
     "DualEnvelope",
     "Estimate",
     "Fit",
+    "FixedRoutes",
     "HeardTopic",
     "LatencyParams",
     "Link",
@@ -110,7 +110,6 @@ __all__ = [
     "RateControl",
     "RateParams",
     "ReassemblyParams",
-    "Relay",
     "RelayParams",
     "RepeatParams",
     "Retain",

@@ -29,15 +29,14 @@ from sdrlinkd.link.receive import (
     Newcomer,
     PduHeard,
     PduPlaced,
-    PduToRelay,
     Reception,
     RecordHeard,
-    RelayParams,
     Retain,
     can_be_true,
 )
 from sdrlinkd.link.repeat import Answers, Asking, RepeatParams
 from sdrlinkd.link.report import NO_NAMES, Names, Reporter
+from sdrlinkd.link.routes import Again, PduToRelay, RelayParams, Routes
 from sdrlinkd.link.schedule import ClassesParams, Forecasts
 from sdrlinkd.link.status import AirUse, Told, Why
 from sdrlinkd.link.timesync import ClockParams, Clocks, Estimate, State, Wall
@@ -73,14 +72,17 @@ from sdrlinkd.wire import (
     TOPIC_OVERHEAD,
     WANTED_OVERHEAD,
     Clock,
+    Lsa,
     Need,
     Receipt,
     Registry,
     Repeat,
+    Route,
     Topic,
     Waits,
     Wanted,
     equal_payload,
+    needs,
 )
 
 NO_DICTIONARIES: Mapping[int, ZstdCompressionDict] = {}
@@ -157,9 +159,12 @@ class Link:
             params, own_id, self._outbox, self._piggyback, rng, reassembly.timeout_s, has_control,
             classes,
         )  # fmt: skip
+        self._routes = Routes(
+            relay, own_id, params.hop_limit, self._composer.k_single, lambda: rng.randrange(1 << 16)
+        )
         self._reception = Reception(
-            params, reassembly, registry, self._heard_topics, own_id, relay, Inflated(dictionaries),
-            max_expanded, hears_self, self.sealing, clear_size,
+            params, reassembly, registry, self._heard_topics, own_id, self._routes,
+            Inflated(dictionaries), max_expanded, hears_self, self.sealing, clear_size,
         )  # fmt: skip
         self._team: frozenset[int] = frozenset()
         """The robots that the configuration names."""
@@ -180,7 +185,7 @@ class Link:
         self._control_records = ControlRecords(
             clock, self._clocks, beacons, self._tx_delays, self._piggyback,
             self._reception.neighbors, TopicTeller(self._topics, piece), self._wants, self.sealing,
-            self._asking, self._composer.k_single, own_id, clear_size,
+            self._asking, self._routes, self._composer.k_single, own_id, clear_size,
         )  # fmt: skip
         self._forecasts = Forecasts()
         self._scheduler: BurstScheduler | NoRadio = NoRadio()
@@ -188,7 +193,8 @@ class Link:
         self._reporter = Reporter(
             self._topics, self._heard_topics, digest, self._outbox, self._intake,
             self._composer, self._control_records, self._tx_delays, self._reception, self._receipts,
-            self._clocks, self.sealing, self._asking, self._answers, own_id, clear_size,
+            self._clocks, self.sealing, self._asking, self._answers, self._routes, own_id,
+            clear_size,
         )  # fmt: skip
 
     # The radio.
@@ -221,9 +227,11 @@ class Link:
             self.sealing.begin_anew()
             self._answers.restart()
             self._asking.restart()
+            self._routes.begin_anew()
             self._reception.begin_anew()
         self.sealing.opener.set_uncertainty(fit.stamp_s)
         self._clocks.set_resolution(fit.stamp_s)
+        self._routes.set_needed_snr(fit.rate.least_snr_db)
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next; None: nothing to send, or not yet."""
@@ -242,6 +250,10 @@ class Link:
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
         """Settle a burst by the outcome that the radio reports."""
         self._scheduler.confirm(burst, outcome, now)
+        if outcome is Outcome.SENT and self._routes.is_auto:
+            for octets, number in burst.numbered():
+                self._routes.sent(octets, number, now)
+            self._tell_routes(now)
         self._tell_dropped()
 
     def hear(
@@ -258,7 +270,9 @@ class Link:
         and `ended_at` default to `at`.
         """
         now, ended_at = at if now is None else now, at if ended_at is None else ended_at
-        return self._dispatch(self._reception.hear(data, at, snr_db, now, ended_at))
+        delivered = self._dispatch(self._reception.hear(data, at, snr_db, now, ended_at))
+        self._tell_routes(now)
+        return delivered
 
     # The bus.
 
@@ -427,6 +441,9 @@ class Link:
         self._dispatch(self._reception.expire(now))
         self.sealing.look(now)
         self._answers.expire(now)
+        for again in self._routes.look(now):
+            self._send_again(again, now)
+        self._tell_routes(now)
         self._control_records.look_round(now, scheduler.record_pdu_s)
         self._control_records.tell_topics(now, scheduler.record_pdu_s)
         self._tell_dropped()
@@ -447,7 +464,7 @@ class Link:
     @property
     def relays(self) -> bool:
         """Whether this node relays PDUs of others."""
-        return self._reception.relays
+        return self._routes.is_on
 
     def drain(self) -> None:
         """Prepare to stop: send partial PDUs at once, and send no more beacons."""
@@ -506,16 +523,21 @@ class Link:
                     self._record_heard(event)
                 case PduPlaced():
                     self._asking.placed(event)
+                    if self._routes.is_auto:
+                        self._note_link(event)
                     self._answers.heard(event.read.pdu.src, event.number % PDU_NUMBERS)
                 case Newcomer():
                     self._asking.forget(event.src)
                     self._answers.restarted(event.src)
+                    self._routes.newcomer(event.src, event.at)
                     # The new robot lacks the messages latched before.
                     self._latched.newcomer(event.src, event.at)
                     self._control_records.newcomer(event.at)
                 case Ended(src, topic_id, entry_id, reason, age_s, at):
                     receipt = make_receipt(src, topic_id, entry_id, reason, age_s)
                     self._control_records.receipt(receipt, at)
+                case PduToRelay() if event.is_spare:
+                    self._routes.keep(event)
                 case PduToRelay():
                     self._forward(event)
         return delivered
@@ -540,15 +562,43 @@ class Link:
             n_others = len(self._reception.neighbors.present(at))
             self._answers.needed(src, record, at, n_others)
             self._scheduler.more_to_send()
-        else:
+        elif not isinstance(record, Lsa | Route):
             self._scheduler.record_heard(src, record, at)
+        if isinstance(record, Need | Lsa | Route):
+            for waiting in self._routes.hear(src, record, at):
+                self._forward_after_all(waiting)
 
     def _forward(self, event: PduToRelay) -> None:
-        pdu, data, at, until, is_ours_too, number = event
+        pdu, data, at, until, is_ours_too, number, _ = event
         refused = self._intake.forward(pdu, data, at, until, number, self._scheduler.bytes_per_s)
         if refused and not is_ours_too:
             self._reception.relay_refused()
         self._scheduler.more_to_send()
+
+    def _forward_after_all(self, event: PduToRelay) -> None:
+        if not event.is_ours_too:
+            self._reception.relayed_after_all()
+        self._forward(event)
+
+    def _note_link(self, event: PduPlaced) -> None:
+        read, src = event.read, event.read.pdu.src
+        neighbor = self._reception.neighbors.get(src)
+        snr_db = None if neighbor is None else neighbor.mean_snr_db
+        self._routes.placed(
+            src, read.pdu.dst, event.number, event.at, snr_db, is_direct=not read.is_relayed,
+            has_messages=read.control.n_entries < len(read.pdu.entries),
+        )  # fmt: skip
+
+    def _send_again(self, again: Again, now: float) -> None:
+        """Repeat PDUs that a robot should have answered, as if it had asked for them."""
+        for need in needs(again.src, sorted(again.numbers)):
+            self._answers.needed(again.hop, need, now, 1)
+            self._scheduler.more_to_send()
+
+    def _tell_routes(self, now: float) -> None:
+        if self._routes.has_news:
+            self._control_records.tell_routes(now, self._scheduler.record_pdu_s)
+            self._scheduler.more_to_send()
 
     def _refused(self, receipt: str, topic_id: int, reason: str, dst: int | None) -> None:
         dst = self._intake.destination(topic_id) if dst is None else dst

@@ -11,6 +11,7 @@ from sdrlinkd.link.queue import Intake, Outbox
 from sdrlinkd.link.receipts import Receipts
 from sdrlinkd.link.receive import Reception
 from sdrlinkd.link.repeat import Answers, Asking
+from sdrlinkd.link.routes import Routes
 from sdrlinkd.link.status import RateMeter
 from sdrlinkd.link.timesync import Clocks
 from sdrlinkd.link.topics import HeardTopics, OwnTopics
@@ -55,11 +56,12 @@ class Reporter:
         digest: RegistryDigest, outbox: Outbox, intake: Intake, composer: Composer,
         control_records: ControlRecords, tx_delays: TxDelayMeters, reception: Reception,
         receipts: Receipts, clocks: Clocks, sealing: Sealing | InTheClear, asking: Asking,
-        answers: Answers, own_id: int, pdu_size: int,
+        answers: Answers, routes: Routes, own_id: int, pdu_size: int,
     ) -> None:  # fmt: skip
         self._own_id = own_id
         self._asking = asking
         self._answers = answers
+        self._routes = routes
         self._sealing = sealing
         self._pdu_size = pdu_size
         self._own = topics
@@ -104,6 +106,7 @@ class Reporter:
             registry_digest=self._digest.overall.hex(),
             security=self._sealing.report(now),
             relayed=self._intake.report_relayed(),
+            routes=self._routes.report(now),
             repeats=self._asking.report(self._answers.report()),
             fragments_repaired=self._reception.fragments_repaired,
             receipts_untold=records.receipts_untold,

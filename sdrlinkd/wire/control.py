@@ -32,15 +32,29 @@ from sdrlinkd.wire.record_types import (
 )
 from sdrlinkd.wire.registry import BROADCAST, RegistryDigest
 from sdrlinkd.wire.repeat import (
+    BARE_OVERHEAD,
     NEED_OVERHEAD,
     PDU_NUMBER,
     REPEAT_SIZE,
+    Bare,
     Need,
     Repeat,
+    build_bare,
     build_need,
     build_repeat,
+    parse_bare,
     parse_need,
     parse_repeat,
+)
+from sdrlinkd.wire.routing import (
+    LSA_OVERHEAD,
+    ROUTE_OVERHEAD,
+    Lsa,
+    Route,
+    build_lsa,
+    build_route,
+    parse_lsa,
+    parse_route,
 )
 
 TLV_HEADER_SIZE = 2
@@ -64,6 +78,9 @@ Record = (
     | KeyTold
     | Need
     | Repeat
+    | Lsa
+    | Route
+    | Bare
 )
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
@@ -108,6 +125,9 @@ _LEAST = {
     int(RecordType.KEY): KEY_SIZE,
     int(RecordType.NEED): NEED_OVERHEAD - TLV_HEADER_SIZE + 1,
     int(RecordType.REPEAT): REPEAT_SIZE - TLV_HEADER_SIZE,
+    int(RecordType.BARE): BARE_OVERHEAD - TLV_HEADER_SIZE + 1,
+    int(RecordType.LSA): LSA_OVERHEAD - TLV_HEADER_SIZE,
+    int(RecordType.ROUTE): ROUTE_OVERHEAD - TLV_HEADER_SIZE,
 }
 
 
@@ -123,6 +143,9 @@ _READERS: dict[int, Callable[[bytes], Record]] = {
     RecordType.KEY: parse_key,
     RecordType.NEED: parse_need,
     RecordType.REPEAT: parse_repeat,
+    RecordType.BARE: parse_bare,
+    RecordType.LSA: parse_lsa,
+    RecordType.ROUTE: parse_route,
 }
 """Readers of the values of records without fixed fields, by type number."""
 
@@ -203,6 +226,9 @@ _BUILDERS: dict[type[Record], tuple[RecordType, Callable[[Any], bytes]]] = {
     KeyTold: (RecordType.KEY, build_key),
     Need: (RecordType.NEED, build_need),
     Repeat: (RecordType.REPEAT, build_repeat),
+    Bare: (RecordType.BARE, build_bare),
+    Lsa: (RecordType.LSA, build_lsa),
+    Route: (RecordType.ROUTE, build_route),
 }
 
 

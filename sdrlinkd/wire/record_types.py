@@ -21,11 +21,14 @@ class RecordType(IntEnum):
     CLOCK = 8
     WAITS = 9
     NEED = 10
+    LSA = 13
+    ROUTE = 14
     TOPIC = 15
     WANTED = 17
     REPEAT = 18
     CONTACT = 19
     KEY = 20
+    BARE = 21
 
 
 class Stamp(NamedTuple):

@@ -1,4 +1,4 @@
-"""PDU numbers, and the records NEED and REPEAT (wire document, 3.2, 6.13 and 6.14)."""
+"""PDU numbers, and the records NEED, REPEAT and BARE (wire document, 3.2, 6.13, 6.14, 6.17)."""
 
 import struct
 from collections.abc import Iterable
@@ -15,6 +15,10 @@ MAX_HELD_REPEAT = 0xFFFF
 _NEED = struct.Struct(">BI")
 NEED_OVERHEAD = 2 + _NEED.size
 """Octets of a NEED record without its bitmap."""
+BARE_BACK = 96
+"""How far back a BARE record reaches. A PDU that is made anew has a number a little higher."""
+BARE_OVERHEAD = 2 + 1
+"""Octets of a BARE record without its bitmap."""
 _REPEAT = struct.Struct(">BIHB")
 REPEAT_SIZE = 2 + _REPEAT.size
 """Octets of a REPEAT record."""
@@ -34,9 +38,7 @@ class Need(NamedTuple):
 
     def numbers(self) -> list[int]:
         """The numbers of the PDUs that are missing."""
-        bits = int.from_bytes(self.bitmap, "big")
-        last = 8 * len(self.bitmap) - 1
-        return [(self.number + i) % PDU_NUMBERS for i in range(last + 1) if bits >> (last - i) & 1]
+        return [each % PDU_NUMBERS for each in _set_bits(self.number, self.bitmap)]
 
 
 class Repeat(NamedTuple):
@@ -49,6 +51,34 @@ class Repeat(NamedTuple):
     number: int
     held_100us: int
     n_pdus: int
+
+
+class Bare(NamedTuple):
+    """BARE record: PDUs of the sender that hold nothing that is sent again.
+
+    Bit 7 of the first octet of `bitmap` stands for the last PDU before with sequence number `seq`,
+    and each further bit for the next.
+    """
+
+    seq: int
+    bitmap: bytes
+
+    def numbers(self, number: int) -> list[int]:
+        """The numbers of these PDUs, told in PDU `number`; they may be negative."""
+        first = number - 1 - ((number - 1 - self.seq) & 0xFF)
+        return [each for each in _set_bits(first, self.bitmap) if each < number]
+
+
+def bare(numbers: Iterable[int], number: int) -> Bare | None:
+    """The BARE record in PDU `number` on the PDUs `numbers` before it; None if there are none.
+
+    What is too far back for the record is left out.
+    """
+    near = sorted(each for each in numbers if 0 < number - each <= BARE_BACK)
+    if not near:
+        return None
+    bits = sum(1 << (near[-1] - each) for each in near)
+    return Bare(near[0] & 0xFF, _bitmap(bits, near[-1] - near[0] + 1))
 
 
 def needs(node: int, missing: Iterable[int], most: int = MAX_BITMAP) -> list[Need]:
@@ -72,8 +102,19 @@ def needs(node: int, missing: Iterable[int], most: int = MAX_BITMAP) -> list[Nee
 
 
 def _need(node: int, first: int, bits: int, n_bits: int) -> Need:
+    return Need(node, first % PDU_NUMBERS, _bitmap(bits, n_bits))
+
+
+def _bitmap(bits: int, n_bits: int) -> bytes:
     size = -(-n_bits // 8)
-    return Need(node, first % PDU_NUMBERS, (bits << (8 * size - n_bits)).to_bytes(size, "big"))
+    return (bits << (8 * size - n_bits)).to_bytes(size, "big")
+
+
+def _set_bits(first: int, bitmap: bytes) -> list[int]:
+    """The numbers that the ones in a bitmap stand for; its first bit stands for `first`."""
+    bits = int.from_bytes(bitmap, "big")
+    last = 8 * len(bitmap) - 1
+    return [first + i for i in range(last + 1) if bits >> (last - i) & 1]
 
 
 def nearest_number(known: int, seq: int) -> int:
@@ -92,6 +133,18 @@ def parse_need(value: bytes) -> Need:
     """The fields of a NEED value of sufficient length; what follows 16 octets is ignored."""
     node, number = _NEED.unpack_from(value)
     return Need(node, number, bytes(value[_NEED.size : _NEED.size + MAX_BITMAP]))
+
+
+def build_bare(told: Bare) -> bytes:
+    """The value of a BARE record. Raises ValueError if a field is out of range."""
+    if not 1 <= len(told.bitmap) <= MAX_BITMAP:
+        raise ValueError(f"{told} does not fit its record")
+    return bytes((told.seq,)) + told.bitmap
+
+
+def parse_bare(value: bytes) -> Bare:
+    """The fields of a BARE value of sufficient length; what follows 16 octets is ignored."""
+    return Bare(value[0], bytes(value[1 : 1 + MAX_BITMAP]))
 
 
 def build_repeat(repeat: Repeat) -> bytes:

@@ -57,6 +57,7 @@ MISTAKES = [
     ('[relay]\npolicy = "routes"', 2, ["relay.routes: got []", "1>3"]),
     ('[relay]\npolicy = "routes"\nroutes = ["1-3"]', 3, ['relay.routes: got "1-3"', "FROM>TO"]),
     ('[relay]\npolicy = "flood"', 2, ["link.hop_limit: got 1", "at least 2"]),
+    ('[relay]\npolicy = "auto"', 2, ["link.hop_limit: got 1", "at least 2"]),
     ('[chrony]\nsocket = "/run/c.sock"\nrobot = 1', 3, ["chrony.robot: got 1", "another robot"]),
     (
         f"{LOOPBACK}[modem]\nrate_hz = 1e5\nmax_cfo_hz = 1e5", 4,

@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Callable
+from itertools import cycle
 from pathlib import Path
 from random import Random
 
@@ -13,7 +14,7 @@ from backends.recording import describe
 from sdrlinkd.bus import envelope
 from sdrlinkd.config import parse_config
 from sdrlinkd.errors import ConfigError, EnvelopeError, PduError
-from sdrlinkd.link import ClockParams, RelayParams, RepeatParams
+from sdrlinkd.link import ClockParams, Outcome, RelayParams, RepeatParams
 from sdrlinkd.pdulink.gnuradio import pmt
 from sdrlinkd.pdulink.gnuradio.pdus import from_gnu_radio
 from sdrlinkd.sealing import Key, Remembered, Sealing, SecurityParams
@@ -64,6 +65,7 @@ class Hearing:
 
     def __init__(self) -> None:
         self._n = FORGET_AFTER
+        self._policies = cycle(("flood", "auto"))
 
     def __call__(self, data: bytes) -> None:
         """Hear PDUs of PDU_SIZE octets, one after the other."""
@@ -71,7 +73,7 @@ class Hearing:
             self._n, self._now = 0, 0.0
             self._link = make_link(
                 2, pdu_size=PDU_SIZE, beacon_s=1.0, clock=ClockParams(), repeat=RepeatParams(),
-                relay=RelayParams(policy="flood"), hop_limit=3, has_numbers=True, seed=1,
+                relay=RelayParams(policy=next(self._policies)), hop_limit=3, has_numbers=True, seed=1,
             )  # fmt: skip
         self._n += 1
         link = self._link
@@ -82,8 +84,10 @@ class Hearing:
             if self._n % 8 == 0:
                 link.submit(0, b"\0\1\0\0" + bytes(80), self._now)
                 link.handle_timers(self._now)
-            if next_burst(link, self._now) is not None and self._n % 64 == 0:
-                assert link.audit() == []
+            burst = next_burst(link, self._now)
+            if burst is not None:
+                link.confirm(burst, Outcome.SENT, self._now)
+                assert self._n % 64 or link.audit() == []
 
 
 class Opening:

@@ -7,7 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link import Outcome, Overrides, Qos, QueueParams, Relay, RelayParams, TopicPolicy
+from sdrlinkd.link import (
+    FixedRoutes,
+    Outcome,
+    Overrides,
+    Qos,
+    QueueParams,
+    RelayParams,
+    TopicPolicy,
+)
 from sdrlinkd.wire import parse
 from tests.laws import law
 from tests.link.world import compose, make_link, rx, send_all, tx
@@ -83,7 +91,7 @@ def test_routes(routes, src, dst, goes):
 @pytest.mark.parametrize("text", ["1-3", "1>", ">3", "1>256", "255>1", "all>3", "1>everyone", ""])
 def test_a_route_that_cannot_be_read_is_refused(text):
     with pytest.raises(ConfigError, match="allowed: FROM>TO"):
-        Relay(RelayParams(policy="routes", routes=[text]), 2)
+        FixedRoutes(RelayParams(policy="routes", routes=[text]))
 
 
 def test_hops_end():

@@ -4,7 +4,7 @@ import pytest
 
 from sdrlinkd.link import ClassesParams, DefaultParams, Outcome, RepeatParams
 from sdrlinkd.wire import Need, Parity, Repeat, leaves_later, needs
-from tests.link.test_repeats import PDU_SIZE, Air, message, once
+from tests.link.lossy import PDU_SIZE, Air, message, once
 from tests.link.world import make_link, neighbors, next_burst, records_in, tell
 
 

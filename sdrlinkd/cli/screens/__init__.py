@@ -10,6 +10,7 @@ from sdrlinkd.cli.screens.figures import (
     sparkline,
 )
 from sdrlinkd.cli.screens.latency import latency_screen
+from sdrlinkd.cli.screens.routes import routes_screen
 from sdrlinkd.cli.screens.rows import failed, is_idle, robots_table
 from sdrlinkd.cli.screens.status import StatusScreen, verdict
 
@@ -25,6 +26,7 @@ __all__ = [
     "milliseconds",
     "rate",
     "robots_table",
+    "routes_screen",
     "sparkline",
     "verdict",
 ]

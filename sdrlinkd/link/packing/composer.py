@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from random import Random
 from typing import NamedTuple
 
+from sdrlinkd.link.packing.bare_numbers import BareNumbers
 from sdrlinkd.link.packing.draft import BuiltPdu, Draft, EntryWriter
 from sdrlinkd.link.packing.entry_ids import REST_FACTOR, TopicEntryIds
 from sdrlinkd.link.packing.flush import Flush
@@ -62,16 +63,9 @@ class Composer:
     """Fills PDUs from the outbox; `rng` chooses the first sequence number and the entry ids."""
 
     def __init__(
-        self,
-        params: LinkParams,
-        src: int,
-        outbox: Outbox,
-        piggyback: PiggybackRecords,
-        rng: Random,
-        reassembly_timeout_s: float,
-        has_control: bool,
-        classes: ClassesParams,
-    ) -> None:
+        self, params: LinkParams, src: int, outbox: Outbox, piggyback: PiggybackRecords,
+        rng: Random, reassembly_timeout_s: float, has_control: bool, classes: ClassesParams,
+    ) -> None:  # fmt: skip
         self._pdu_size = params.pdu_size
         self._hop_limit = params.hop_limit
         self._is_greedy = params.greedy
@@ -97,6 +91,7 @@ class Composer:
         self._flush = Flush(params.flush_s, outbox, self.k_single, reassembly_timeout_s)
         self._pdus = 0
         self._entries = 0
+        self._bare = BareNumbers()
 
     def fill(self, start: float, allowance: Allowance, source: int | None = None) -> list[BuiltPdu]:
         """The PDUs of a burst whose preamble leaves at `start`; empty if there is nothing to send.
@@ -148,6 +143,8 @@ class Composer:
         if draft.is_empty:
             return []
         draft.address(BROADCAST, Qos.DEFAULT)
+        self._bare.ride(draft, self.next_number)
+        self._bare.note(self.next_number)
         self._pdus += 1
         return [self._finish(draft)]
 
@@ -238,6 +235,8 @@ class Composer:
                     self._writer.stamp(draft, message, start)
         if self._piggyback.waiting and draft.dst == BROADCAST:
             self._piggyback.ride(draft, start, self.next_number)
+        if self._bare.untold:
+            self._bare.ride(draft, self.next_number)
         return self._finish(draft)
 
     def _next_full(self, start: float, most: int, source: int | None) -> list[BuiltPdu]:

@@ -22,7 +22,7 @@ from sdrlinkd.wire import (
 LASTING = frozenset(
     {
         RecordType.CLOCK, RecordType.RECEIPT, RecordType.TOPIC, RecordType.WANTED,
-        RecordType.CONTACT, RecordType.NEED,
+        RecordType.CONTACT, RecordType.NEED, RecordType.ROUTE, RecordType.LSA,
     }
 )  # fmt: skip
 """Record types that a new beacon does not replace."""
@@ -87,9 +87,19 @@ class PiggybackRecords:
         self.waiting[built[0],] = _Waiting(built, due_at, _made_later(record))
         self._note_due()
 
+    def put_as(self, key: tuple[int, ...], record: Record, due_at: float) -> None:
+        """Add a record; it replaces the one with this key, and is due when the earlier of both is.
+
+        The type of the record comes first in `key`.
+        """
+        known = self.waiting.get(key)
+        due_at = due_at if known is None else min(due_at, known.due_at)
+        self.waiting[key] = _Waiting(build_records([record]), due_at)
+        self._note_due()
+
     def put_needs(self, needs: Iterable[Need], due_at: float) -> None:
-        """Replace all NEED records."""
-        for key in [key for key in self.waiting if key[0] == RecordType.NEED]:
+        """Replace all NEED records that ask for something."""
+        for key in [key for key in self.waiting if _asks(key)]:
             del self.waiting[key]
         for need in needs:
             key = (int(RecordType.NEED), need.node, need.number)
@@ -98,7 +108,7 @@ class PiggybackRecords:
 
     def asked_nodes(self) -> set[int]:
         """The robots that the waiting NEED records are about."""
-        return {key[1] for key in self.waiting if key[0] == RecordType.NEED}
+        return {key[1] for key in self.waiting if _asks(key)}
 
     def put_receipt(self, receipt: Receipt, due_at: float, since: float) -> None:
         """Add a RECEIPT that reports an event at `since`."""
@@ -161,6 +171,11 @@ class PiggybackRecords:
 
     def _note_due(self) -> None:
         self.due_at = min((each.due_at for each in self.waiting.values()), default=inf)
+
+
+def _asks(key: tuple[int, ...]) -> bool:
+    """Whether a record asks for PDUs: a NEED without a number only answers."""
+    return key[0] == RecordType.NEED and key[2] >= 0
 
 
 def _made_later(record: Record) -> Beacon | Clock | None:

@@ -20,13 +20,11 @@ from sdrlinkd.link.receive.events import (
     Newcomer,
     PduHeard,
     PduPlaced,
-    PduToRelay,
     RecordHeard,
 )
 from sdrlinkd.link.receive.latency import Latency, Parts
 from sdrlinkd.link.receive.neighbors import LONGEST_GAP_S, PRESENT_S, Neighbor, Neighbors
 from sdrlinkd.link.receive.reception import Reception
-from sdrlinkd.link.receive.relay import Relay, RelayParams
 from sdrlinkd.link.receive.repeated import can_be_true
 
 __all__ = [
@@ -48,11 +46,8 @@ __all__ = [
     "Parts",
     "PduHeard",
     "PduPlaced",
-    "PduToRelay",
     "Reception",
     "RecordHeard",
-    "Relay",
-    "RelayParams",
     "Retain",
     "SequenceTrack",
     "can_be_true",

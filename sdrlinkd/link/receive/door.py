@@ -8,12 +8,15 @@ from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.neighbors import Neighbors
 from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import RxLedger
+from sdrlinkd.link.routes import Routes
 from sdrlinkd.sealing import InTheClear, Opened, Sealing
 from sdrlinkd.wire import SEQ, SRC, is_sealed
 
 WAIT_S = 2.0
 """Time in s for which PDUs wait for the proof of their source, and for which a schedule of a robot
 that is not proven is followed."""
+_KNOWN = ("rx_dup", "rx_own")
+"""Reasons to refuse a PDU that came or left before."""
 MOST_WAITING = 512
 """Most PDUs of one source that wait."""
 
@@ -58,8 +61,9 @@ class Door:
 
     def __init__(
         self, sealing: Sealing | InTheClear, acceptance: Acceptance, ledger: RxLedger,
-        neighbors: Neighbors, repeated: RepeatedPdus,
+        neighbors: Neighbors, repeated: RepeatedPdus, routes: Routes,
     ) -> None:  # fmt: skip
+        self._routes = routes
         self._repeated = repeated
         self._neighbors = neighbors
         self._sealing = sealing
@@ -87,6 +91,8 @@ class Door:
             opened = self._opener.open(data, at, at - first_at)
         except PduError as error:
             self._refuse(error.reason)
+            if error.reason in _KNOWN:
+                self._routes.forwarded(data, at)
             neighbor = self._neighbors.get(data[SRC]) if error.reason == "rx_dup" else None
             if neighbor is not None:
                 neighbor.count_duplicate()

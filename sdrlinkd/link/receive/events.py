@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from sdrlinkd.link.receive.delivered import Delivered
+from sdrlinkd.link.routes import PduToRelay
 from sdrlinkd.wire import Pdu, Record, Stamp
 
 if TYPE_CHECKING:
@@ -63,21 +64,6 @@ class PduPlaced(NamedTuple):
     skipped: Sequence[int]
     is_wanted: bool
     at: float
-
-
-class PduToRelay(NamedTuple):
-    """A PDU to be relayed; all its messages are worthless after `until`.
-
-    Its ages are those at `at`. `is_ours_too`: the PDU is for this robot as well as for others.
-    `number` is its PDU number, None if unknown.
-    """
-
-    pdu: Pdu
-    data: bytes
-    at: float
-    until: float
-    is_ours_too: bool
-    number: int | None = None
 
 
 Event = Delivered | PduHeard | RecordHeard | Newcomer | Ended | PduPlaced | PduToRelay

@@ -1,7 +1,6 @@
 """The receive side of the link, from PDUs heard to complete messages."""
 
 from collections.abc import Sequence
-from math import inf
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.packing import is_sound, missing_fragments
@@ -10,21 +9,21 @@ from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.ages import Ages
 from sdrlinkd.link.receive.completion import Completion
 from sdrlinkd.link.receive.door import Admitted
-from sdrlinkd.link.receive.events import Ended, Event, Newcomer, PduHeard, PduPlaced, PduToRelay
+from sdrlinkd.link.receive.events import Ended, Event, Newcomer, PduHeard, PduPlaced
 from sdrlinkd.link.receive.heard_records import HeardRecords
 from sdrlinkd.link.receive.neighbors import Neighbor, Neighbors
 from sdrlinkd.link.receive.pdu_read import PduRead, PduReader
 from sdrlinkd.link.receive.recorded import OwnPdus, RecentCommands
-from sdrlinkd.link.receive.relay import Relay
+from sdrlinkd.link.receive.relaying import Relaying
 from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import Held, RxLedger
 from sdrlinkd.link.receive.undeclared import Whole
+from sdrlinkd.link.routes import Routes
 from sdrlinkd.link.topics import HeardTopics
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
     PARTS,
-    PDU_NUMBERS,
     SEQ,
     Beacon,
     Clock,
@@ -59,7 +58,7 @@ class Inbox:
         own_id: int,
         hears_self: bool,
         neighbors: Neighbors,
-        relay: Relay,
+        routes: Routes,
         acceptance: Acceptance,
         ledger: RxLedger,
         topics: HeardTopics,
@@ -77,7 +76,7 @@ class Inbox:
         self._own_id = own_id
         self._hears_self = hears_self
         self._neighbors = neighbors
-        self._relay = relay
+        self._routes = routes
         self._acceptance = acceptance
         self._has_control = registry.has_control
         self._topics = topics
@@ -88,6 +87,9 @@ class Inbox:
         )
         self._reassembly = Reassembly(limits)
         self._ages = Ages(reassembly.timeout_s)
+        self._relaying = Relaying(
+            routes, acceptance, topics, self._ages, has_control=registry.has_control
+        )
         self._ledger = ledger
         self._commands = commands
 
@@ -102,7 +104,9 @@ class Inbox:
             read = self._reader.read(admitted)
         except PduError as error:
             return self._drop(error.reason, events)
-        pdu, control, _, is_relayed, _ = read
+        pdu, control, _, is_relayed, is_forwarded = read
+        if is_forwarded:
+            self._routes.forwarded(admitted.raw, at)
         stamps = read.stamps
         if not admitted.was_seen and (pdu.src != self._own_id or is_relayed):
             events.append(PduHeard(pdu, stamps, at, is_relayed))
@@ -136,14 +140,13 @@ class Inbox:
         for stamp in stamps:
             self._ages.stamp(pdu.src, stamp, at)
         is_ours = pdu.dst in (BROADCAST, self._own_id) or self._hears_self
-        is_relay = self._relay.wants(pdu) and admitted.is_proven
+        to_relay = self._relaying.judge(read, admitted, first_at, track, is_ours=is_ours)
+        is_relay = to_relay is not None and not to_relay.is_spare
         if track.is_numbered:
             events.append(PduPlaced(read, track.number, track.skipped, is_ours or is_relay, at))
-        if is_relay:
-            until = min(at + self._relay.lifespan_s, self._fresh_until(pdu))
-            number = track.number % PDU_NUMBERS if track.is_numbered else None
-            events.append(PduToRelay(pdu, admitted.raw, first_at, until, is_ours, number))
-            if not is_ours:
+        if to_relay is not None:
+            events.append(to_relay)
+            if is_relay and not is_ours:
                 return self._drop("rx_relayed", events)
         if not is_ours:
             return self._drop("rx_not_for_us", events)
@@ -226,20 +229,6 @@ class Inbox:
         self._note_lost(now, events)
         self._completion.forget(src, now, events)
         self._topics.forget(src)
-
-    def _fresh_until(self, pdu: Pdu) -> float:
-        """Time at which all messages in `pdu` will be too old; infinity if unknown."""
-        until = -inf
-        for entry in pdu.entries:
-            topic_id = entry.topic_id
-            if topic_id == CONTROL_TOPIC_ID and self._has_control:
-                continue
-            origin_at = self._ages.look(pdu.src, topic_id, entry.entry_id).at
-            if origin_at is None:
-                return inf
-            policy = self._acceptance.policy_of(self._topics.topic(pdu.src, topic_id))
-            until = max(until, origin_at + policy.own_lifespan_s)
-        return until if until > -inf else inf
 
     def _repaired(self, src: int, records: list[Record], at: float) -> list[Entry]:
         """Missing fragments that can be computed now, with the parity in `records`."""

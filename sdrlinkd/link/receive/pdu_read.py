@@ -10,11 +10,16 @@ from sdrlinkd.link.receive.events import Event, PduHeard, RecordHeard
 from sdrlinkd.wire import (
     Beacon,
     Clock,
+    Contact,
     ControlEntries,
     Frame,
     Pdu,
+    Receipt,
     Record,
+    RegistryDigest,
     Stamp,
+    TopicPiece,
+    Wanted,
     aged,
     nearest_number,
     numbered,
@@ -23,6 +28,8 @@ from sdrlinkd.wire import (
     with_topic,
 )
 
+_FAR = (Contact, Receipt, RegistryDigest, TopicPiece, Wanted)
+"""Records that count in PDUs that a relay forwarded."""
 _NO_CONTROL = ControlEntries([], 0, 0)
 
 
@@ -38,6 +45,13 @@ class PduRead(NamedTuple):
     records: list[Record]
     is_relayed: bool
     is_forwarded: bool
+
+    @property
+    def is_far(self) -> bool:
+        """Whether there is something in it for robots that hear relays only."""
+        return self.control.n_entries < len(self.pdu.entries) or any(
+            isinstance(record, _FAR) for record in self.records
+        )
 
     @property
     def stamps(self) -> list[Stamp]:

@@ -14,9 +14,9 @@ from sdrlinkd.link.receive.handover import AgeReport, Handover
 from sdrlinkd.link.receive.inbox import Inbox
 from sdrlinkd.link.receive.neighbors import Neighbors
 from sdrlinkd.link.receive.recorded import OwnPdus, RecentCommands
-from sdrlinkd.link.receive.relay import Relay, RelayParams
 from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import RxLedger
+from sdrlinkd.link.routes import Routes
 from sdrlinkd.link.topics import HeardTopics
 from sdrlinkd.reports import ReceivedTopicReport, RxReport
 from sdrlinkd.sealing import InTheClear, Sealing
@@ -37,7 +37,7 @@ class Reception:
         registry: Registry,
         topics: HeardTopics,
         own_id: int,
-        relay: RelayParams,
+        routes: Routes,
         inflated: Inflated,
         max_expanded: int,
         hears_self: bool,
@@ -47,7 +47,6 @@ class Reception:
         self._own_src = bytes((own_id,))
         self.neighbors = Neighbors(own_id)
         """The robots that are heard."""
-        self._relay = Relay(relay, own_id)
         self._topics = topics
         self._acceptance = Acceptance(
             registry, inflated, max_expanded, sealing.opener.delivers_unproven, sealing.is_on
@@ -56,13 +55,13 @@ class Reception:
         self.own_pdus = OwnPdus()
         """What this robot sent lately."""
         repeated = self._repeated = RepeatedPdus()
-        self._door = Door(sealing, self._acceptance, self._ledger, self.neighbors, repeated)
+        self._door = Door(sealing, self._acceptance, self._ledger, self.neighbors, repeated, routes)
         self._commands = RecentCommands(self._acceptance, topics)
         completion = self._completion = Completion(
             topics, self._acceptance, self._ledger, self.neighbors
         )
         self._inbox = Inbox(
-            params, reassembly, registry, own_id, hears_self, self.neighbors, self._relay,
+            params, reassembly, registry, own_id, hears_self, self.neighbors, routes,
             self._acceptance, self._ledger, topics, completion, repeated,
             self.own_pdus, self._commands, clear_size,
         )  # fmt: skip
@@ -104,6 +103,10 @@ class Reception:
         """Move one PDU from rx_relayed to rx_not_for_us, as the queue refused it."""
         self._ledger.relay_refused()
 
+    def relayed_after_all(self) -> None:
+        """Move one PDU from rx_not_for_us to rx_relayed, as it is forwarded later."""
+        self._ledger.relayed_after_all()
+
     def deliver(self, message: Delivered, now: float) -> float | None:
         """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
         return self._handover.deliver(message, self._acceptance.policy_of(message.topic), now)
@@ -140,11 +143,6 @@ class Reception:
     def holds(self, src: int, topic_id: int, entry_id: int) -> bool:
         """Whether fragments of a message are held that lacks others."""
         return self._inbox.holds(src, topic_id, entry_id)
-
-    @property
-    def relays(self) -> bool:
-        """Whether this node relays PDUs of others."""
-        return self._relay.is_on
 
     @property
     def holds_parts(self) -> bool:

@@ -48,6 +48,11 @@ class RxLedger:
         self._pdus_dropped["rx_relayed"] -= 1
         self._pdus_dropped["rx_not_for_us"] += 1
 
+    def relayed_after_all(self) -> None:
+        """Move one PDU from rx_not_for_us to rx_relayed, as it is forwarded later."""
+        self._pdus_dropped["rx_not_for_us"] -= 1
+        self._pdus_dropped["rx_relayed"] += 1
+
     def skip_records(self, n: int) -> None:
         """Count control entries that could not be read (rx_control_bad)."""
         self._control_bad += n

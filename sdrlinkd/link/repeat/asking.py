@@ -14,6 +14,7 @@ from sdrlinkd.wire import (
     NEED_OVERHEAD,
     PARTS,
     PDU_NUMBERS,
+    Bare,
     Need,
     Parity,
     needs,
@@ -126,6 +127,8 @@ class Asking:
         is_wanted = event.is_wanted or (before is not None and before.is_wanted)
         if event.skipped and is_wanted:
             self._skipped(source, before, event)
+        if source.missing:
+            self._drop_bare(source, event)
 
     def others_need(self, need: Need, at: float) -> None:
         """Take the question of another robot: what we lack, too, need not be asked for again."""
@@ -226,6 +229,14 @@ class Asking:
             self._given_up += 1
         self._look_ahead()
 
+    def _drop_bare(self, source: _Source, event: PduPlaced) -> None:
+        """Do not ask for PDUs that hold nothing that is repeated."""
+        for record in event.read.records:
+            if isinstance(record, Bare):
+                for number in record.numbers(event.number):
+                    source.missing.pop(number % PDU_NUMBERS, None)
+                self._look_ahead()
+
     def _count(self, source: _Source, missing: _Missing, at: float) -> None:
         missing.asks_left -= 1
         missing.asked_at = at
@@ -244,8 +255,10 @@ class Asking:
                 self._given_up += not is_over
 
     def _waits(self, source: _Source, missing: _Missing, now: float) -> bool:
-        """Whether to ask later: parity may still come, or nothing was heard since the last time."""
-        if missing.asked_at >= source.heard_at:
+        """Whether to ask later: parity may still come, or the last question would be asked of a
+        source of which nothing was heard since the one before.
+        """
+        if missing.asks_left == 1 and missing.asked_at >= source.heard_at:
             missing.next_at = now + source.again_s
             return True
         if not missing.inside or source.last is None or now - source.last.at > ALONE_S:

@@ -1,5 +1,6 @@
 """A burst of PDUs, and its outcome."""
 
+from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
 
@@ -44,6 +45,17 @@ class Burst(NamedTuple):
     """When it was to leave at last; times inside are those of then."""
     repeated: RepeatGroup | None = None
     """The PDUs inside that are repeated, if this is why the burst leaves."""
+
+    def numbered(self) -> Iterator[tuple[bytes, int]]:
+        """(octets, PDU number) of each PDU with messages, as far as the number is known."""
+        if self.repeated is not None:
+            yield from ((kept.octets, kept.number) for kept in self.repeated.kept)
+            return
+        for octets, messages, own in zip(self.pdus, self.carried, self.numbers, strict=False):
+            if messages:
+                number = messages[0].pdu_number if messages[0].is_whole else own
+                if number is not None:
+                    yield octets, number
 
     def is_in_vain(self, now: float) -> bool:
         """Whether all messages inside have outlived their lifespans, and there are some."""

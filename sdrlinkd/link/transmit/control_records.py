@@ -2,12 +2,13 @@
 
 It handles several kinds of records: beacons (with digest, link reports and WAITS), the schedule of
 the access policy (FRAME), clocks (CLOCK), RECEIPTs, declarations (TOPIC), what consumers here
-subscribe to (WANTED), the PDUs that we lack (NEED), and the proof that we are alive (CONTACT). Each
-record is made when it is due, uses spare room in a broadcast PDU, and from a certain time on gets
-its own PDU. Such a PDU takes airtime from messages, and a half-duplex radio is deaf while it sends.
-So PDUs that hold only records take at most `clock.share` of the airtime, all robots together: with
-n robots, each sends at most one such PDU every n · pdu_s / share. This limits beacons, too, unless
-rate control or a schedule depends on them. Declarations and questions have shares of their own.
+subscribe to (WANTED), the PDUs that we lack (NEED), links and routes (LSA, ROUTE), and the proof
+that we are alive (CONTACT). Each record is made when it is due, uses spare room in a broadcast PDU,
+and from a certain time on gets its own PDU. Such a PDU takes airtime from messages, and a half-
+duplex radio is deaf while it sends. So PDUs that hold only records take at most `clock.share` of
+the airtime, all robots together: with n robots, each sends at most one such PDU every n · pdu_s /
+share. This limits beacons, too, unless rate control or a schedule depends on them. Declarations,
+questions and routes have shares of their own.
 """
 
 from math import inf
@@ -15,7 +16,8 @@ from math import inf
 from sdrlinkd.link.packing import BuiltPdu, PiggybackRecords
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.receive import Neighbors
-from sdrlinkd.link.repeat import Asking
+from sdrlinkd.link.repeat import Asking, Budget
+from sdrlinkd.link.routes import Routes
 from sdrlinkd.link.timesync import ClockParams, Clocks
 from sdrlinkd.link.topics import TopicTeller, Wants
 from sdrlinkd.link.transmit.beacons import Beacons
@@ -41,6 +43,8 @@ from sdrlinkd.wire import (
 PATIENCE_S = 0.05
 """Shortest time in s that a RECEIPT or a WANTED waits for spare room."""
 MOST_RECEIPTS = 256
+ROUTES_SHARE = 0.02
+"""Largest share of the airtime for PDUs with nothing but LSA, ROUTE, and answers to them."""
 UNANSWERED = 4
 """How many robots share the airtime for records, whether they hear us or not."""
 MOST_BEACON_S = 5.0
@@ -68,12 +72,15 @@ class ControlRecords:
         wants: Wants,
         sealing: Sealing | InTheClear,
         asking: Asking,
+        routes: Routes,
         record_room: int,
         own_id: int,
         clear_size: int,
     ) -> None:
         self._sealing = sealing
         self._asking = asking
+        self._routes = routes
+        self._route_budget = Budget(ROUTES_SHARE)
         self._own_id = own_id
         self._clear_size = clear_size
         self._params = params
@@ -214,6 +221,17 @@ class ControlRecords:
         if self._piggyback.holds(RecordType.TOPIC) and self._teller.may_pay(now, pdu_s):
             self._piggyback.make_due(RecordType.TOPIC, self._room, now)
 
+    def tell_routes(self, now: float, pdu_s: float) -> None:
+        """Offer what others must know of links and routes, in PDUs of `pdu_s` if there is no room.
+
+        These have a share of the air of their own.
+        """
+        for record, key, alone_at in self._routes.told(now):
+            due_at = max(alone_at, self._route_budget.free_at(now))
+            if self._n_others:
+                self._piggyback.put_as(key, record, due_at)
+                self._route_budget.spend(pdu_s, now, is_bounded=True)
+
     def clear_key(self, start: float) -> BuiltPdu | None:
         """A PDU in the clear with the KEY record that is due at `start`, if one is."""
         if start < self._sealing.key_due_at:
@@ -256,6 +274,9 @@ class ControlRecords:
     def _offer_beacon(self, start: float, frame: Frame | None, rate: RateControl) -> None:
         records: list[Record] = self._beacons.take(start, self._neighbors, rate)
         records += self._tx_delays.records()
+        digest = self._routes.digest()
+        if digest is not None:
+            self._piggyback.put_as((RecordType.LSA, digest.node), digest, inf)
         if frame is not None:
             records.append(frame)
         further = self._sealing.further_key()

@@ -91,6 +91,8 @@ class RateControl:
         """The MCS of bursts that every robot should be able to read."""
         self.usable = range(self.lowest, (self._highest if params.adapt else self._fixed) + 1)
         """All MCS that may be chosen."""
+        self.least_snr_db = needed_snr_db[self.lowest]
+        """The SNR in dB that the most robust MCS in use needs."""
         self._peers: dict[int, _Peer] = {}
         self.changes: deque[RateChange] = deque(maxlen=KEPT_CHANGES)
         """Latest changes of the MCS for default and bulk."""

@@ -1,0 +1,93 @@
+"""The best paths through a team, and who forwards what is for everyone."""
+
+from collections import defaultdict
+from collections.abc import Mapping
+from heapq import heappop, heappush
+from math import inf
+
+Edges = Mapping[int, Mapping[int, float]]
+"""What a PDU from one robot to another costs: `edges[a][b]`, in PDUs that are sent for it."""
+NEAR = 1.1
+"""How much longer than the best path one may be that takes fewer relays."""
+
+
+def distances(edges: Edges, source: int) -> tuple[dict[int, float], dict[int, int]]:
+    """(cost from `source`, the robot before it on the best path) of all robots that are reached.
+
+    Dijkstra's algorithm. Among equals, the lower id comes first, so that all robots agree.
+    """
+    found: dict[int, float] = {}
+    before: dict[int, int] = {}
+    heap = [(0.0, source, source)]
+    while heap:
+        cost, robot, last = heappop(heap)
+        if robot in found:
+            continue
+        found[robot] = cost
+        if robot != source:
+            before[robot] = last
+        for other, more in edges.get(robot, {}).items():
+            if other not in found:
+                heappush(heap, (cost + more, other, robot))
+    return found, before
+
+
+def path(edges: Edges, source: int, to: int) -> list[int]:
+    """The robots on the best path, with both ends; empty if there is none."""
+    _, before = distances(edges, source)
+    if to != source and to not in before:
+        return []
+    found = [to]
+    while found[-1] != source:
+        found.append(before[found[-1]])
+    return found[::-1]
+
+
+def tree(edges: Edges, source: int) -> dict[int, frozenset[int]]:
+    """For each robot that sends or forwards what `source` sends to everyone: who forwards it next.
+
+    Every robot is reached over a path that is nearly the best. Among these, few robots forward.
+    """
+    cost, _ = distances(edges, source)
+    forwards = {source}
+    parents: dict[int, int] = {}
+    left = sorted((each for each in cost if each != source), key=lambda each: (cost[each], each))
+    while left:
+        near = {each: _parents(edges, cost, each) for each in left}
+        waiting = []
+        for each in left:
+            known = [parent for parent in near[each] if parent in forwards]
+            if known:
+                parents[each] = min(known, key=lambda parent: (cost[parent], parent))
+            else:
+                waiting.append(each)
+        if waiting:
+            forwards.add(_most_useful(near, waiting, cost, parents))
+        left = waiting
+    following: defaultdict[int, set[int]] = defaultdict(set)
+    for each in forwards - {source}:
+        following[parents[each]].add(each)
+    return {each: frozenset(following[each]) for each in forwards}
+
+
+def _parents(edges: Edges, cost: Mapping[int, float], robot: int) -> set[int]:
+    """Those from which a robot can have a PDU over a path that is nearly the best."""
+    most = NEAR * cost[robot]
+    return {
+        each
+        for each, at in cost.items()
+        if at < cost[robot] and at + edges.get(each, {}).get(robot, inf) <= most
+    }
+
+
+def _most_useful(
+    near: Mapping[int, set[int]], waiting: list[int], cost: Mapping[int, float],
+    reached: Mapping[int, int],
+) -> int:  # fmt: skip
+    """The robot, of those that are reached, from which most of the others can have a PDU."""
+    useful: dict[int, int] = defaultdict(int)
+    for each in waiting:
+        for parent in near[each]:
+            if parent in reached:
+                useful[parent] += 1
+    return min(useful, key=lambda robot: (-useful[robot], cost[robot], robot))
