@@ -73,7 +73,8 @@ class Hearing:
             self._n, self._now = 0, 0.0
             self._link = make_link(
                 2, pdu_size=PDU_SIZE, beacon_s=1.0, clock=ClockParams(), repeat=RepeatParams(),
-                relay=RelayParams(policy=next(self._policies)), hop_limit=3, has_numbers=True, seed=1,
+                relay=RelayParams(policy=next(self._policies)), hop_limit=3, has_numbers=True,
+                seed=1,
             )  # fmt: skip
         self._n += 1
         link = self._link
