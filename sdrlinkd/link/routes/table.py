@@ -68,6 +68,9 @@ class LsaTable:
         best = sorted(losses.items(), key=lambda each: (each[1], each[0]))[:room]
         told = tuple(sorted(best))
         held = self._held.get(self._own_id)
+        if held is None and not told:
+            # Nobody is there to be told.
+            return None
         if held is not None and not self._is_overtaken:
             if told == held.lsa.losses:
                 return None

@@ -228,9 +228,8 @@ class ControlRecords:
         """
         for record, key, alone_at in self._routes.told(now):
             due_at = max(alone_at, self._route_budget.free_at(now))
-            if self._n_others:
-                self._piggyback.put_as(key, record, due_at)
-                self._route_budget.spend(pdu_s, now, is_bounded=True)
+            self._piggyback.put_as(key, record, due_at)
+            self._route_budget.spend(pdu_s, now, is_bounded=True)
 
     def clear_key(self, start: float) -> BuiltPdu | None:
         """A PDU in the clear with the KEY record that is due at `start`, if one is."""
