@@ -41,6 +41,11 @@ TEXTS = {
         "acknowledgments with the times of OpenPGM's examples; it shares the air without beacons "
         "or clocks. Losses in bursts last 50 ms on average."
     ),
+    "team": (
+        "Real links on an air of bursts in virtual time, half duplex, 5 Msps, 16QAM 1/2, 25 dB: "
+        "robot 1 reaches robot 4 through 2 or 3, and robot 5 behind it. Beacons, clocks, LSA and "
+        "ROUTE are on the same air. The relay in use dies at a random time."
+    ),
     "modem_path": (
         "The first two rows are wall time through one daemon, its modem and a paced loopback. "
         "The others are CPU time of one core: how many times faster than the samples come."

@@ -50,6 +50,7 @@ ROWS = {
         "images_delivered_2pct_random_pct",
         "urgent_lost_twice_pct",
     },
+    "team": {"reroute_s", "reroute_to_all_s"},
     "modem_path": {
         "odom_30hz_latency_ms_p50",
         "odom_30hz_latency_ms_p99",

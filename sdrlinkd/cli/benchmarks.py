@@ -26,6 +26,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "repeats": Benchmark(
         "Messages over an air that loses PDUs: with repeats, and as others do it.", 3,
     ),
+    "team": Benchmark("Teams over several hops: how soon routes heal, and what that costs.", 1),
     "modem_path": Benchmark("The modem in a daemon: latency, and speed relative to real time.", 2),
     "realtime": Benchmark("Whole daemons in real time: latency, ages, load and start.", 8),
     "waterfall": Benchmark("Where a message's time goes in a daemon, stage by stage.", 1),

@@ -1,0 +1,1 @@
+"""Teams on one air: routes that heal, chains, and what all of it costs."""
