@@ -128,7 +128,7 @@ class Opener:
         is_proven = is_own or peer.proof is not None
         own_age_s = at - self._peers.began
         if not is_own and peer.is_late(
-            lead_s, held_s, self._limit_s, own_age_s, is_judged=is_proven or self._takes_all
+            lead_s, held_s, self._limit_s, own_age_s, is_proven or self._takes_all
         ):
             if own_age_s > JUST_STARTED_S:
                 self._strangers.late(src, at)
@@ -145,7 +145,7 @@ class Opener:
         """
         own_age_s = at - self._peers.began
         peer = self._peers.of(src)
-        return peer.is_late(lead_s, held_s, self._limit_s, own_age_s, is_judged=True)
+        return peer.is_late(lead_s, held_s, self._limit_s, own_age_s, True)
 
     def refuses_clear(self, data: bytes, now: float) -> bool:
         """Whether an intact PDU in the clear is refused; a KEY record in it is noted."""

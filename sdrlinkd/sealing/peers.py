@@ -56,8 +56,11 @@ class Least:
     """The least value of the last 30 to 60 s."""
 
     def __init__(self) -> None:
-        self._begin = -inf
-        self._now = self._before = inf
+        self.until = -inf
+        """When the present 30 s end."""
+        self.lately = inf
+        """The least value in them."""
+        self._before = inf
         self.value = inf
         """The least value; infinity if there is none."""
         self.added_at = -inf
@@ -65,13 +68,13 @@ class Least:
     def add(self, value: float, at: float) -> None:
         """Note a value at time `at`."""
         self.added_at = at
-        if at >= self._begin + BUCKET_S:
-            is_next = at < self._begin + 2 * BUCKET_S
-            self._before, self._now = (self._now if is_next else inf), inf
-            self._begin = at
+        if at >= self.until:
+            is_next = at < self.until + BUCKET_S
+            self._before, self.lately = (self.lately if is_next else inf), inf
+            self.until = at + BUCKET_S
             self.value = self._before
-        if value < self._now:
-            self._now = value
+        if value < self.lately:
+            self.lately = value
             self.value = min(value, self._before)
 
 
@@ -177,12 +180,18 @@ class Peer:
                 proof = None
                 self.restart()
         if proof is not None:
-            if lead_s + proof.ahead_s < -limit_s:
+            ahead_s, proven_at = proof
+            if lead_s + ahead_s < -limit_s:
                 self.restart()
                 ended = True
-            elif at - self.heard_at >= SILENT_S or at - proof.at >= PROOF_S:
+            elif at - self.heard_at >= SILENT_S or at - proven_at >= PROOF_S:
                 self.proof, ended = None, True
-        self.least.add(lead_s, at)
+        least = self.least
+        if at < least.until and lead_s >= least.lately:
+            # The usual case.
+            least.added_at = at
+        else:
+            least.add(lead_s, at)
         if ended or self.first_at == inf:
             self.first_at = at
         return ended
@@ -197,7 +206,7 @@ class Peer:
         self.least = Least()
 
     def is_late(
-        self, lead_s: float, held_s: float, limit_s: float, own_age_s: float, *, is_judged: bool
+        self, lead_s: float, held_s: float, limit_s: float, own_age_s: float, is_judged: bool
     ) -> bool:
         """Whether a PDU's delay differs from `held_s` by more than `limit_s`.
 

@@ -35,7 +35,6 @@ _BODY_AT = _HEAD.size
 _SECRET_END = -CRC_SIZE
 _COUNT = 0x0F
 """The bits of the hop octet that stay the same on the way."""
-_CLEAR = tuple(bytes((value & ~FLAG_SEALED,)) for value in range(256))
 _NO_CRC = bytes(CRC_SIZE)
 _make = tuple.__new__
 """Makes a named tuple in half the time that its own constructor takes."""
@@ -73,7 +72,7 @@ class Sealed(NamedTuple):
         number = kid << _KID_AT | ticks
         associated = _HEAD.pack(first, src, dst, seq, hop & _COUNT, number, 0)
         text = decrypt(_NONCE.pack(number, seq), data[_BODY_AT:_SECRET_END], associated)
-        return b"".join((_CLEAR[first], data[1:HEADER_SIZE], text, _NO_CRC))
+        return _BEGIN.pack(first & ~FLAG_SEALED, src, dst, seq, hop) + text + _NO_CRC
 
 
 def is_sealed(data: bytes) -> bool:
