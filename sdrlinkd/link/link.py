@@ -23,6 +23,8 @@ from sdrlinkd.link.queue import (
 )
 from sdrlinkd.link.receipts import Receipts, Verdict, make_receipt
 from sdrlinkd.link.receive import (
+    HEAD,
+    TAIL,
     Delivered,
     Ended,
     Event,
@@ -168,7 +170,7 @@ class Link:
         )  # fmt: skip
         self._team: frozenset[int] = frozenset()
         """The robots that the configuration names."""
-        self._own_bursts = self._reception.own_pdus.bursts
+        self._own_begins = self._reception.own_pdus.begins
         self._receipts = Receipts(own_id, params.receipt_s)
         beacons = Beacons(params.beacon_s if has_control else 0.0, params.pdu_size, digest, rng)
         clock = clock if has_control else NO_CLOCK
@@ -237,7 +239,7 @@ class Link:
         """The burst that should leave next; None: nothing to send, or not yet."""
         burst = self._scheduler.next_burst(opportunity)
         if burst is not None:
-            self._own_bursts.append(burst.pdus)
+            self._own_begins.extend([pdu[HEAD] + pdu[TAIL] for pdu in burst.pdus])
             if self._composer.asking:
                 self._expect_receipts(burst.start)
                 self._tell_dropped()

@@ -25,15 +25,18 @@ from sdrlinkd.link.receive.events import (
 from sdrlinkd.link.receive.latency import Latency, Parts
 from sdrlinkd.link.receive.neighbors import LONGEST_GAP_S, PRESENT_S, Neighbor, Neighbors
 from sdrlinkd.link.receive.reception import Reception
+from sdrlinkd.link.receive.recorded import HEAD, TAIL
 from sdrlinkd.link.receive.repeated import can_be_true
 
 __all__ = [
     "CDR_HEADER_SIZE",
     "DELIVERED",
+    "HEAD",
     "LONGEST_GAP_S",
     "MAX_WAITING",
     "NOT_RETAINED",
     "PRESENT_S",
+    "TAIL",
     "Ages",
     "Deadman",
     "Delivered",

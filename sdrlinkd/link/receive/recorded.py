@@ -10,8 +10,10 @@ from sdrlinkd.wire import Pdu
 COMMANDS_S = 10.0
 """Time in s for which a PDU with commands is known again."""
 MOST_KEPT = 4096
-MOST_BURSTS = 256
-"""How many of our bursts are known again."""
+MOST_OWN = 4096
+"""How many of our PDUs are known again."""
+HEAD, TAIL = slice(4), slice(5, 10)
+"""The first octets of a PDU, without the one that a relay changes."""
 FOREIGN, FOREIGN_S = 3, 10.0
 """How many PDUs with our id within how many s show that another robot has it."""
 
@@ -54,18 +56,14 @@ class OwnPdus:
     """What we sent lately, to tell echoes and relayed copies of it from another robot's PDUs."""
 
     def __init__(self) -> None:
-        self.bursts: deque[list[bytes]] = deque(maxlen=MOST_BURSTS)
-        """The PDUs of each of our last bursts."""
+        self.begins: deque[bytes] = deque(maxlen=MOST_OWN)
+        """The octets HEAD and TAIL of our last PDUs."""
         self._foreign: deque[float] = deque(maxlen=FOREIGN)
 
     def heard(self, octets: bytes, at: float) -> None:
         """Take an intact PDU with our id that came at `at`."""
-        # A relay changes hops, ages and CRC.
-        begin = octets[:4] + octets[5:10]
-        for burst in reversed(self.bursts):
-            if any(pdu[:4] + pdu[5:10] == begin for pdu in burst):
-                return
-        self._foreign.append(at)
+        if octets[HEAD] + octets[TAIL] not in self.begins:
+            self._foreign.append(at)
 
     def begin_anew(self) -> None:
         """Go on with another clock; what was heard lately is forgotten."""
