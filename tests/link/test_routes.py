@@ -118,6 +118,20 @@ def test_a_relay_that_comes_back_is_used_if_it_is_needed():
     assert [n for n in air.numbers(3) if n >= 100] == list(range(100, 120))
 
 
+@pytest.mark.parametrize("dst", [3, BROADCAST])
+def test_the_only_relay_goes_on_though_its_answers_are_not_heard(dst):
+    air = mesh((1, 2), (2, 3))
+    air.run(2.5)
+    overrides = Overrides(dst=dst)
+    air.flow(1, 50, every_s=PERIOD_S, overrides=overrides)
+    air.hears -= {(1, 2)}
+    air.flow(1, 40, every_s=PERIOD_S, first=50, overrides=overrides)
+    air.hears |= {(1, 2)}
+    air.flow(1, 100, every_s=PERIOD_S, first=90, overrides=overrides)
+    air.run(air.now + 0.5)
+    assert sorted(air.numbers(3)) == list(range(190))
+
+
 def test_a_far_robot_that_restarts_is_believed_though_its_numbers_begin_anew():
     air = mesh((1, 2), (2, 3))
     air.run(2.5)

@@ -111,17 +111,23 @@ class Forwarding:
             if flow.is_active(now) or flow.robots
         ]
 
-    def _edges(self) -> Edges:
-        """The links of the team, without ours to robots that do not answer."""
+    def _edges(self, dst: int) -> Edges:
+        """The links of the team, without ours to robots that do not answer.
+
+        If `dst`, or some robot where that is everyone, cannot be reached without these, all links.
+        """
         edges, own = self._links.edges, self._own_id
         if not self.around:
             return edges
         left = {node: cost for node, cost in edges.get(own, {}).items() if node not in self.around}
-        return {**edges, own: left}
+        fewer = {**edges, own: left}
+        reached, wanted = (set(distances(each, own)[0]) for each in (fewer, edges))
+        is_enough = reached == wanted if dst == BROADCAST else dst in reached
+        return fewer if is_enough else edges
 
     def _reroute(self, flow: Flow, now: float) -> None:
         """Find out who forwards a flow next."""
-        edges = self._edges()
+        edges = self._edges(flow.dst)
         if flow.dst == BROADCAST:
             robots = hops = tree(edges, flow.src).get(self._own_id, frozenset())
         else:
@@ -158,8 +164,7 @@ class Forwarding:
         self.around[hop] = now
         self._version = -1
         self._reroute(flow, now)
-        if hop in flow.hops:
-            return
+        # If there is no other path, it goes on with what comes next.
         flow.forgive(hop)
         if flow.robots != before:
             flow.went_around += 1

@@ -98,13 +98,6 @@ class Named:
                 del self._until[ends]
                 self._alone.pop(ends, None)
 
-    def tellers(self, now: float) -> dict[Ends, list[int]]:
-        """Who names this robot, by source and destination."""
-        return {
-            ends: sorted(teller for teller, until in known.items() if until > now)
-            for ends, known in sorted(self._until.items())
-        }
-
     def begin_anew(self) -> None:
         """Go on with another clock."""
         self._until.clear()
