@@ -87,9 +87,13 @@ class BagWriter:
         self._counts[message.topic, message.type, message.is_latched] += 1
 
     def sync(self) -> None:
-        """Write what was added, so that the bag is whole."""
-        self._file.sync()
+        """Write what was added, so that the bag is whole.
+
+        The metadata come first: readers overlook topics that these do not list, and do not mind if
+        there are fewer messages.
+        """
         self._write_metadata()
+        self._file.sync()
 
     def close(self) -> None:
         """Write the rest, and close the file."""
