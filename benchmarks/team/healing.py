@@ -2,10 +2,9 @@
 
 from math import inf
 from random import Random
-from statistics import median
 from typing import NamedTuple
 
-from benchmarks.team.teams import Flow, Settings, Team
+from benchmarks.team.teams import Flow, Team
 from sdrlinkd.wire import BROADCAST
 
 LINKS = ((1, 2), (1, 3), (2, 4), (3, 4), (4, 5))
@@ -34,7 +33,7 @@ def heal(seed: int, *, to_all: bool) -> Healed:
         counted_at=LAST,
     )  # fmt: skip
     dies_s = DIES_S + Random(seed).uniform(0, 0.5)
-    team = Team(range(1, 6), LINKS, [flow], Settings(), seed)
+    team = Team(range(1, 6), LINKS, [flow], seed)
     team.simulation.run(dies_s)
     (relay,) = team.forwarded_by(FIRST, FIRST, flow.dst)
     team.simulation.silence(relay, 2 * END_S)
@@ -45,13 +44,3 @@ def heal(seed: int, *, to_all: bool) -> Healed:
         min(back, default=inf) - dies_s, flow.n - len(heard.at), flow.n,
         team.control_share(),
     )  # fmt: skip
-
-
-def worst(found: list[Healed]) -> float:
-    """The longest time that the flow was away, in s."""
-    return max(each.back_s for each in found)
-
-
-def usual(found: list[Healed]) -> float:
-    """The median of these times, in s."""
-    return median(each.back_s for each in found)

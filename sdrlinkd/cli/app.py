@@ -55,6 +55,10 @@ RuntimeDir = Annotated[
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable JSON.")]
+Watch = Annotated[
+    bool,
+    typer.Option("--watch", "-w", help="Refresh the screen until Ctrl-C, even across a restart."),
+]
 
 
 def main() -> None:

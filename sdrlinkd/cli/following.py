@@ -2,15 +2,20 @@
 
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 import msgspec
+from rich.console import RenderableType
+from rich.live import Live
+from rich.text import Text
 
 from sdrlinkd.cli.app import connect
 from sdrlinkd.client import ControlClient, NoDaemonError, runtime_dir
 from sdrlinkd.reports import Snapshot
+from sdrlinkd.tables import screen_console
 
 WATCH_PERIOD_S = 0.5
 PATIENCE_S = 2.0
@@ -69,3 +74,19 @@ class Follower:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def watch_screen(
+    directory: str | os.PathLike[str] | None, draw: Callable[[Snapshot], RenderableType]
+) -> NoReturn:
+    """Keep a screen fresh until Ctrl-C."""
+    console = screen_console()
+    with (
+        Follower(directory) as follower,
+        Live(console=console, screen=console.is_terminal, auto_refresh=False) as live,
+    ):
+        while True:
+            snapshot = follower.look()
+            shown: RenderableType = Text(follower.waiting, style="bold yellow")
+            live.update(shown if snapshot is None else draw(snapshot), refresh=True)
+            time.sleep(WATCH_PERIOD_S)

@@ -1,17 +1,14 @@
 """`latency`: shows how late messages arrive and why, and how well other clocks are known."""
 
-import time
 from typing import Annotated
 
 import msgspec
 import typer
-from rich.console import Group, RenderableType
-from rich.live import Live
-from rich.text import Text
+from rich.console import Group
 
-from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
+from sdrlinkd.cli.app import AsJson, RuntimeDir, Watch, app, connect
 from sdrlinkd.cli.completion import heard_names
-from sdrlinkd.cli.following import WATCH_PERIOD_S, Follower
+from sdrlinkd.cli.following import watch_screen
 from sdrlinkd.cli.screens import latency_screen
 from sdrlinkd.cli.status import ask_status
 from sdrlinkd.errors import UserError
@@ -27,16 +24,11 @@ def latency(
     ] = None,
     runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
-    watch: Annotated[
-        bool,
-        typer.Option(
-            "--watch", "-w", help="Refresh the screen until Ctrl-C, even across a restart."
-        ),
-    ] = False,
+    watch: Watch = False,
 ) -> None:
     """Show the latency of each received topic, its causes, and the clocks of the neighbors."""
     if watch and not as_json:
-        _watch(Follower(runtime_dir), topic)
+        watch_screen(runtime_dir, lambda snapshot: _screen(snapshot.link, topic))
     with connect(runtime_dir) as control:
         link = ask_status(control).link
     if as_json:
@@ -47,20 +39,6 @@ def latency(
         typer.echo(msgspec.json.encode(told).decode())
         return
     screen_console().print(_screen(link, topic))
-
-
-def _watch(follower: Follower, topic: str | None) -> None:
-    """Keep the screen fresh until Ctrl-C."""
-    console = screen_console()
-    alone = console.is_terminal
-    with follower, Live(console=console, screen=alone, auto_refresh=False) as live:
-        while True:
-            snapshot = follower.look()
-            shown: RenderableType = Text(follower.waiting, style="bold yellow")
-            if snapshot is not None:
-                shown = _screen(snapshot.link, topic)
-            live.update(shown, refresh=True)
-            time.sleep(WATCH_PERIOD_S)
 
 
 def _screen(link: LinkReport, topic: str | None) -> Group:

@@ -1,17 +1,14 @@
 """`routes`: shows who hears whom in the team, and who forwards what."""
 
-import time
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
 import typer
-from rich.console import Group, RenderableType
-from rich.live import Live
-from rich.text import Text
+from rich.console import Group
 
-from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
-from sdrlinkd.cli.following import WATCH_PERIOD_S, Follower
+from sdrlinkd.cli.app import AsJson, RuntimeDir, Watch, app, connect
+from sdrlinkd.cli.following import watch_screen
 from sdrlinkd.cli.output import load_pictures
 from sdrlinkd.cli.screens import routes_screen
 from sdrlinkd.cli.status import ask_status
@@ -24,20 +21,17 @@ from sdrlinkd.tables import screen_console
 def routes(
     runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
-    watch: Annotated[
-        bool,
-        typer.Option(
-            "--watch", "-w", help="Refresh the screen until Ctrl-C, even across a restart."
-        ),
-    ] = False,
+    watch: Watch = False,
     picture: Annotated[
         Path | None,
         typer.Option(help="Also draw the links as a graph into this file (.png)."),
     ] = None,
 ) -> None:
     """Show who hears whom in the team, and who forwards what goes through this robot."""
+    if picture is not None and picture.suffix != ".png":
+        raise UserError(f"--picture: got {picture}; allowed: names that end in .png")
     if watch and not as_json:
-        _watch(Follower(runtime_dir))
+        watch_screen(runtime_dir, _screen)
     with connect(runtime_dir) as control:
         snapshot = ask_status(control)
     if picture is not None:
@@ -61,19 +55,6 @@ def _draw(snapshot: Snapshot, picture: Path) -> None:
         load_pictures("sdrlinkd.cli").draw_routes(snapshot.node, snapshot.link.routes, picture)
     except OSError as error:
         raise UserError(f"--picture: {picture}: {error.strerror}") from None
-
-
-def _watch(follower: Follower) -> None:
-    """Keep the screen fresh until Ctrl-C."""
-    console = screen_console()
-    with follower, Live(console=console, screen=console.is_terminal, auto_refresh=False) as live:
-        while True:
-            snapshot = follower.look()
-            shown: RenderableType = Text(follower.waiting, style="bold yellow")
-            if snapshot is not None:
-                shown = _screen(snapshot)
-            live.update(shown, refresh=True)
-            time.sleep(WATCH_PERIOD_S)
 
 
 def _screen(snapshot: Snapshot) -> Group:

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
+from sdrlinkd.cli.app import AsJson, RuntimeDir, Watch, app, connect
 from sdrlinkd.cli.completion import field_names
 from sdrlinkd.cli.fields import USUAL, CsvLines, as_text, fields_of
 from sdrlinkd.cli.following import WATCH_PERIOD_S, Follower
@@ -34,12 +34,7 @@ def ask_status(control: ControlClient) -> Snapshot:
 def status(
     runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
-    watch: Annotated[
-        bool,
-        typer.Option(
-            "--watch", "-w", help="Refresh the screen until Ctrl-C, even across a restart."
-        ),
-    ] = False,
+    watch: Watch = False,
     everything: Annotated[
         bool,
         typer.Option("--all", "-a", help="Show everything, even what does not fit the screen."),

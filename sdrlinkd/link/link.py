@@ -594,7 +594,7 @@ class Link:
     def _send_again(self, again: Again, now: float) -> None:
         """Repeat PDUs that a robot should have answered, as if it had asked for them."""
         for need in needs(again.src, sorted(again.numbers)):
-            self._answers.needed(again.hop, need, now, 1)
+            self._answers.needed(again.hop, need, now, 1, is_asked=False)
             self._scheduler.more_to_send()
 
     def _tell_routes(self, now: float) -> None:

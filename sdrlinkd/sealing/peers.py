@@ -97,6 +97,11 @@ class Peers:
             peer = self.by_src[src] = Peer(partial(self._oldest, src))
         return peer
 
+    def begin(self, now: float) -> None:
+        """Note that this life of ours has begun, unless that was noted before."""
+        if self.began == -inf:
+            self.began = now
+
     def was_opened(self, src: int) -> bool:
         """Whether a sealed PDU of robot `src` was ever opened in this life."""
         known = self.by_src.get(src)

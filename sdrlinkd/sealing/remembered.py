@@ -1,7 +1,6 @@
 """What sealing must remember over a restart, and when to write it to disk."""
 
 from collections.abc import Mapping
-from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.sealing.held_keys import HeldKeys
@@ -37,8 +36,6 @@ class Memory:
 
     def wanted(self, now: float) -> Remembered | None:
         """What should be written at `now`; None: what is on disk suffices."""
-        if self._peers.began == -inf:
-            self._peers.began = now
         floor, own = self._numbers.wanted_floor(now), self._keys.own.key.fingerprint
         retired = self.on_disk.retired | self._keys.rotation.retired
         if floor is None and self.on_disk.in_use == own and self.on_disk.retired == retired:

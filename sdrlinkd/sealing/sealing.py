@@ -179,7 +179,8 @@ class Sealing:
             self._changed()
 
     def look(self, now: float) -> None:
-        """Change to the next key if it is time."""
+        """Change to the next key if it is time. The first look is the start of this life."""
+        self._peers.begin(now)
         heard_at = {src: peer.heard_at for src, peer in self._peers if src != self._own_id}
         if self._keys.look(now, heard_at):
             self._changed()

@@ -5,7 +5,6 @@ It converts bytes to fields and back. README.md in this folder (the wire documen
 
 from sdrlinkd.wire.builder import VERSION, PduBuilder, build_full
 from sdrlinkd.wire.capacity import (
-    CRC_SIZE,
     ENTRY_HEADER_SIZE,
     HEADER_SIZE,
     MAX_ENTRIES,
@@ -110,7 +109,6 @@ from sdrlinkd.wire.registry import (
     BROADCAST,
     CONTROL_TOPIC_ID,
     DECLARED_TOPIC_ID,
-    MAX_TOPICS,
     Registry,
     RegistryDigest,
     Topic,
@@ -139,7 +137,6 @@ from sdrlinkd.wire.routing import (
     LSA_NUMBERS,
     LSA_OVERHEAD,
     MAX_LOSS,
-    ROUTE_OVERHEAD,
     Lsa,
     Route,
     heard_number,
@@ -175,7 +172,6 @@ __all__ = [
     "CONTACT_OVERHEAD",
     "CONTACT_PREFIX_SIZE",
     "CONTROL_TOPIC_ID",
-    "CRC_SIZE",
     "DECLARED_TOPIC_ID",
     "DST",
     "ENTRY_HEADER_SIZE",
@@ -200,7 +196,6 @@ __all__ = [
     "MAX_NAME",
     "MAX_PDU_SIZE",
     "MAX_SINCE",
-    "MAX_TOPICS",
     "MAX_VALUE_SIZE",
     "MAX_WALL_ERROR_US",
     "MET_SIZE",
@@ -220,7 +215,6 @@ __all__ = [
     "RECEIPT_UNIT_S",
     "REPEAT_SIZE",
     "REPEAT_UNIT_S",
-    "ROUTE_OVERHEAD",
     "SEAL_OVERHEAD",
     "SEQ",
     "SRC",

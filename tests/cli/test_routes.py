@@ -48,4 +48,4 @@ def test_the_picture(tmp_path):
 def test_a_picture_of_another_kind_is_refused_in_a_sentence(ctl, tmp_path):
     code, _, err = ctl("routes", "--runtime-dir", tmp_path, "--picture", "routes.gif")
     assert code == 2
-    assert err
+    assert "--picture: got routes.gif; allowed: names that end in .png" in err

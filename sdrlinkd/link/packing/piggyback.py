@@ -15,7 +15,6 @@ from sdrlinkd.wire import (
     Record,
     RecordType,
     TopicPiece,
-    Wanted,
     build_records,
 )
 
@@ -123,14 +122,6 @@ class PiggybackRecords:
         key = (built[0], piece.number, piece.piece)
         due_at = self.waiting[key].due_at if key in self.waiting else inf
         self.waiting[key] = _Waiting(built, due_at)
-
-    def put_wanted(self, wanted: Wanted, due_at: float) -> None:
-        """Add a WANTED record; it replaces one that still waits, and keeps that one's due time."""
-        built = build_records([wanted])
-        key = (built[0], wanted.node, *wanted.topics[:1])
-        known = self.waiting.get(key)
-        self.waiting[key] = _Waiting(built, due_at if known is None else known.due_at)
-        self._note_due()
 
     def make_due(self, kind: RecordType, room: int, now: float) -> None:
         """Let waiting records of a type, of `room` octets together, get their own PDU from now."""

@@ -7,7 +7,6 @@ to ask and what to repeat, and when. It sends nothing itself: bursts and records
 
 from sdrlinkd.link.repeat.answers import Answers
 from sdrlinkd.link.repeat.asking import Asking
-from sdrlinkd.link.repeat.budget import Budget
 from sdrlinkd.link.repeat.group import RepeatGroup
 from sdrlinkd.link.repeat.kept import Kept
 from sdrlinkd.link.repeat.params import RepeatParams
@@ -15,7 +14,6 @@ from sdrlinkd.link.repeat.params import RepeatParams
 __all__ = [
     "Answers",
     "Asking",
-    "Budget",
     "Kept",
     "RepeatGroup",
     "RepeatParams",

@@ -7,10 +7,10 @@ from math import inf
 from sdrlinkd.link.packing import TopicEntryIds
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outgoing
-from sdrlinkd.link.repeat.budget import Budget
 from sdrlinkd.link.repeat.group import RepeatGroup, Wanted
 from sdrlinkd.link.repeat.kept import Kept, KeptPdus, is_lasting
 from sdrlinkd.link.repeat.params import RepeatParams
+from sdrlinkd.link.schedule import Budget
 from sdrlinkd.reports import RepeatReport
 from sdrlinkd.wire import BROADCAST, PDU_NUMBERS, Need, Repeat
 
@@ -102,16 +102,20 @@ class Answers:
             if qos in self._twice and any(_is_short_lived(each) for each in messages):
                 self.wanted[kept.src, told] = Wanted(kept, start + TWICE_AFTER_S)
 
-    def needed(self, asker: int, need: Need, at: float, n_others: int) -> None:
-        """Take a question that came at `at`, from one of `n_others` robots that hear us."""
+    def needed(
+        self, asker: int, need: Need, at: float, n_others: int, *, is_asked: bool = True
+    ) -> None:
+        """Take a question that came at `at`, from one of `n_others` robots that hear us, or, unless
+        `is_asked`, the lack of an answer.
+        """
         if not self.is_on:
             return
         n_of_asker = sum(asker in each.askers for each in self.wanted.values())
         for number in need.numbers():
-            self._asked += 1
+            self._asked += is_asked
             kept = self._kept.find(need.node, number)
             if kept is None or not kept.is_for(asker) or self._is_stale(kept):
-                self._unknown += 1
+                self._unknown += is_asked
                 continue
             if kept.expires_at() <= at:
                 self._expired += 1
@@ -138,8 +142,7 @@ class Answers:
         """Forget the PDUs of a robot that has restarted, and counts anew."""
         self._newest.pop(src, None)
         self._kept.forget_source(src)
-        for key in [key for key in self.wanted if key[0] == src]:
-            del self.wanted[key]
+        self.wanted = {key: each for key, each in self.wanted.items() if key[0] != src}
 
     def heard(self, src: int, number: int) -> None:
         """Note that another robot has sent a PDU that we might repeat."""

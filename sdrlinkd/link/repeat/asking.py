@@ -7,8 +7,8 @@ from math import inf
 import msgspec
 
 from sdrlinkd.link.receive import PduPlaced
-from sdrlinkd.link.repeat.budget import Budget
 from sdrlinkd.link.repeat.gaps import Message, inside, parts
+from sdrlinkd.link.schedule import Budget
 from sdrlinkd.reports import RepeatReport
 from sdrlinkd.wire import (
     NEED_OVERHEAD,

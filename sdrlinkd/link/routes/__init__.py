@@ -11,11 +11,10 @@ from sdrlinkd.link.routes.fixed import FixedRoutes
 from sdrlinkd.link.routes.forwarding import Again
 from sdrlinkd.link.routes.params import RelayParams
 from sdrlinkd.link.routes.paths import path, tree
-from sdrlinkd.link.routes.routes import ANSWER, Routes
+from sdrlinkd.link.routes.routes import Routes
 from sdrlinkd.link.routes.to_relay import PduToRelay
 
 __all__ = [
-    "ANSWER",
     "Again",
     "FixedRoutes",
     "PduToRelay",

@@ -1,6 +1,5 @@
 """What others name this robot to forward, and the PDUs that it could still forward."""
 
-from collections import deque
 from collections.abc import Callable
 from math import inf
 
@@ -28,7 +27,8 @@ class Named:
         """When each robot's ROUTE that names us ends."""
         self._alone: dict[Ends, bool] = {}
         """Whether the last ROUTE named us alone."""
-        self._spare: deque[PduToRelay] = deque(maxlen=MOST_RECENT)
+        self._spare: dict[tuple[int, int, int], PduToRelay] = {}
+        """By source, destination and sequence number, in the order of arrival."""
 
     def take(self, route: Route, teller: int, at: float) -> list[PduToRelay]:
         """Take a ROUTE of robot `teller`; returns PDUs that came before and are to be forwarded."""
@@ -76,21 +76,22 @@ class Named:
 
     def keep(self, spare: PduToRelay) -> None:
         """Keep a PDU, as somebody may name this robot for it."""
-        self._spare.append(spare)
+        pdu, kept = spare.pdu, self._spare
+        key = pdu.src, pdu.dst, pdu.seq
+        kept.pop(key, None)
+        kept[key] = spare
+        if len(kept) > MOST_RECENT:
+            del kept[next(iter(kept))]
 
     def forwarded(self, ends: Ends, seq: int, hops_left: int) -> None:
         """Note that another robot has forwarded a PDU."""
-        if self._spare:
-            for each in list(self._spare):
-                pdu = each.pdu
-                if (pdu.src, pdu.dst, pdu.seq) == (*ends, seq) and hops_left < pdu.hop:
-                    self._spare.remove(each)
+        known = self._spare.get((*ends, seq))
+        if known is not None and hops_left < known.pdu.hop:
+            del self._spare[*ends, seq]
 
     def expire(self, now: float) -> None:
         """Forget what has ended."""
-        spare = self._spare
-        while spare and spare[0].at < now - RECENT_S:
-            spare.popleft()
+        self._spare = {key: each for key, each in self._spare.items() if each.at >= now - RECENT_S}
         for ends, known in list(self._until.items()):
             for teller in [teller for teller, until in known.items() if until <= now]:
                 del known[teller]
@@ -105,7 +106,7 @@ class Named:
         self._spare.clear()
 
     def _take_spare(self, at: float, suits: Callable[[PduToRelay], bool]) -> list[PduToRelay]:
-        found = [each for each in self._spare if each.at >= at - RECENT_S and suits(each)]
-        for each in found:
-            self._spare.remove(each)
-        return found
+        keys = [
+            key for key, each in self._spare.items() if each.at >= at - RECENT_S and suits(each)
+        ]
+        return [self._spare.pop(key) for key in keys]

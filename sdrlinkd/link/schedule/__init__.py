@@ -1,7 +1,8 @@
 """Decides how long the next burst may be, and whether it should wait.
 
-This package holds the forecasts of messages that are due, the caps and shares of the classes, and
-their credit. It knows neither queue nor radio; their state is passed in as arguments.
+This package holds the forecasts of messages that are due, the caps and shares of the classes and
+their credit, and budgets of airtime. It knows neither queue nor radio; their state is passed in as
+arguments.
 """
 
 from sdrlinkd.link.schedule.allowance import (
@@ -11,6 +12,7 @@ from sdrlinkd.link.schedule.allowance import (
     Allowance,
     Limits,
 )
+from sdrlinkd.link.schedule.budget import Budget
 from sdrlinkd.link.schedule.forecast import Forecasts
 from sdrlinkd.link.schedule.params import (
     BulkParams,
@@ -27,6 +29,7 @@ __all__ = [
     "OVERRUN",
     "SHARED_OVERRUN",
     "Allowance",
+    "Budget",
     "BulkParams",
     "ClassParams",
     "ClassesParams",

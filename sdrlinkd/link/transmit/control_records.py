@@ -16,8 +16,9 @@ from math import inf
 from sdrlinkd.link.packing import BuiltPdu, PiggybackRecords
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.receive import Neighbors
-from sdrlinkd.link.repeat import Asking, Budget
+from sdrlinkd.link.repeat import Asking
 from sdrlinkd.link.routes import Routes
+from sdrlinkd.link.schedule import Budget
 from sdrlinkd.link.timesync import ClockParams, Clocks
 from sdrlinkd.link.topics import TopicTeller, Wants
 from sdrlinkd.link.transmit.beacons import Beacons
@@ -61,22 +62,11 @@ class ControlRecords:
     """
 
     def __init__(
-        self,
-        params: ClockParams,
-        clocks: Clocks,
-        beacons: Beacons,
-        tx_delays: TxDelayMeters,
-        piggyback: PiggybackRecords,
-        neighbors: Neighbors,
-        teller: TopicTeller,
-        wants: Wants,
-        sealing: Sealing | InTheClear,
-        asking: Asking,
-        routes: Routes,
-        record_room: int,
-        own_id: int,
-        clear_size: int,
-    ) -> None:
+        self, params: ClockParams, clocks: Clocks, beacons: Beacons, tx_delays: TxDelayMeters,
+        piggyback: PiggybackRecords, neighbors: Neighbors, teller: TopicTeller, wants: Wants,
+        sealing: Sealing | InTheClear, asking: Asking, routes: Routes, record_room: int,
+        own_id: int, clear_size: int,
+    ) -> None:  # fmt: skip
         self._sealing = sealing
         self._asking = asking
         self._routes = routes
@@ -215,7 +205,8 @@ class ControlRecords:
         Declarations use spare room or, within their share of the air, PDUs of `pdu_s` of their own.
         """
         for wanted in self._wants.due(now, self._neighbors.present(now)):
-            self._piggyback.put_wanted(wanted, self._alone_from(now + PATIENCE_S))
+            key = (RecordType.WANTED, wanted.node, *wanted.topics[:1])
+            self._piggyback.put_as(key, wanted, self._alone_from(now + PATIENCE_S))
         self._offer_contact(now)
         self._offer_topics(now)
         if self._piggyback.holds(RecordType.TOPIC) and self._teller.may_pay(now, pdu_s):

@@ -1,4 +1,4 @@
-"""The share of the air for PDUs that are sent again."""
+"""A share of the air that something may take: repeats, questions, or routes."""
 
 from math import inf
 
