@@ -133,12 +133,14 @@ class AsyncPublisher(AsyncSocket):
         return None
 
     async def wait_for_daemon(self, timeout_s: float | None = None) -> None:
-        """Wait until the daemon answers, for at most `timeout_s` (default: the publisher's).
+        """Wait until the daemon answers and takes messages, as `Publisher.wait_for_daemon`.
 
         Raises NoDaemonError.
         """
-        wait_s = self._timeout_s if timeout_s is None else timeout_s
-        await self._ask(Deadline(wait_s), must_answer=True)
+        deadline = Deadline(self._timeout_s if timeout_s is None else timeout_s)
+        await self._ask(deadline, must_answer=True)
+        if not await self._is_writable(deadline):
+            raise no_daemon(self.runtime_dir)
 
     async def flush(self) -> None:
         """Wait until the daemon has received everything sent, as `Publisher.flush`.

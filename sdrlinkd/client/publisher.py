@@ -152,12 +152,14 @@ class Publisher(Endpoint):
         return None
 
     def wait_for_daemon(self, timeout_s: float | None = None) -> None:
-        """Wait until the daemon answers, for at most `timeout_s` (default: the publisher's).
+        """Wait until the daemon answers and takes messages, for at most `timeout_s`.
 
-        Raises NoDaemonError.
+        The default is the publisher's. From then on, `send` need not wait. Raises NoDaemonError.
         """
-        wait_s = self._timeout_s if timeout_s is None else timeout_s
-        self._ask(Deadline(wait_s), must_answer=True)
+        deadline = Deadline(self._timeout_s if timeout_s is None else timeout_s)
+        self._ask(deadline, must_answer=True)
+        if not self._socket.poll(deadline.left_ms, zmq.POLLOUT):
+            raise no_daemon(self.runtime_dir)
 
     def flush(self, timeout_s: float = 5.0) -> None:
         """Wait until the daemon has received everything sent. Raises NoDaemonError.

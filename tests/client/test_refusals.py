@@ -251,6 +251,28 @@ def test_never_blocking(start_daemon, stop, spawn_again, tmp_path):
         wait_for(sends)
 
 
+@pytest.mark.parametrize("make", [Publisher, AsyncPublisher])
+async def test_a_daemon_that_answers_but_takes_nothing_yet_is_waited_for(
+    start_daemon, tmp_path, make
+):
+    """The two sockets connect one by one; a program that waited may send without blocking."""
+
+    async def result(value):
+        return await value if asyncio.iscoroutine(value) else value
+
+    daemon = start_daemon()
+    (tmp_path / "out.sock").symlink_to(daemon.directory / "out.sock")
+    out = make(tmp_path)
+    try:
+        with pytest.raises(NoDaemonError):
+            await result(out.wait_for_daemon(0.5))
+        (tmp_path / "in.sock").symlink_to(daemon.directory / "in.sock")
+        await result(out.wait_for_daemon(20))
+        assert await result(out.send(ODOM, CDR, wait=False)) is True
+    finally:
+        await result(out.close())
+
+
 async def test_never_blocking_in_asyncio(start_daemon, tmp_path):
     async with AsyncPublisher(tmp_path, timeout_s=0) as out:
         with pytest.raises(NoDaemonError):
