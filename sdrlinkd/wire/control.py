@@ -18,6 +18,16 @@ from sdrlinkd.wire.contact import (
     parse_key,
 )
 from sdrlinkd.wire.declared import TopicPiece, build_topic, parse_topic
+from sdrlinkd.wire.granting import (
+    GRANT_OVERHEAD,
+    WANT_SIZE,
+    Grant,
+    Want,
+    build_grant,
+    build_want,
+    parse_grant,
+    parse_want,
+)
 from sdrlinkd.wire.record_types import (
     NO_AGE,
     Beacon,
@@ -81,6 +91,8 @@ Record = (
     | Lsa
     | Route
     | Bare
+    | Want
+    | Grant
 )
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
@@ -111,6 +123,7 @@ TOPIC_OVERHEAD = TLV_HEADER_SIZE + 4
 WANTED_OVERHEAD = TLV_HEADER_SIZE + 1
 """Octets of a WANTED record without its topics."""
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
+FRAME_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.FRAME].size
 STAMP_RECORD = struct.Struct(">BBBBI")
 ASKING_STAMP_SIZE = STAMP_SIZE + len(ASKS)
 # Smallest length of a record's value in octets, by type number.
@@ -128,6 +141,8 @@ _LEAST = {
     int(RecordType.BARE): BARE_OVERHEAD - TLV_HEADER_SIZE + 1,
     int(RecordType.LSA): LSA_OVERHEAD - TLV_HEADER_SIZE,
     int(RecordType.ROUTE): ROUTE_OVERHEAD - TLV_HEADER_SIZE,
+    int(RecordType.WANT): WANT_SIZE - TLV_HEADER_SIZE,
+    int(RecordType.GRANT): GRANT_OVERHEAD - TLV_HEADER_SIZE,
 }
 
 
@@ -146,6 +161,8 @@ _READERS: dict[int, Callable[[bytes], Record]] = {
     RecordType.BARE: parse_bare,
     RecordType.LSA: parse_lsa,
     RecordType.ROUTE: parse_route,
+    RecordType.WANT: parse_want,
+    RecordType.GRANT: parse_grant,
 }
 """Readers of the values of records without fixed fields, by type number."""
 
@@ -229,6 +246,8 @@ _BUILDERS: dict[type[Record], tuple[RecordType, Callable[[Any], bytes]]] = {
     Bare: (RecordType.BARE, build_bare),
     Lsa: (RecordType.LSA, build_lsa),
     Route: (RecordType.ROUTE, build_route),
+    Want: (RecordType.WANT, build_want),
+    Grant: (RecordType.GRANT, build_grant),
 }
 
 

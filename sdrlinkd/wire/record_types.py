@@ -21,6 +21,8 @@ class RecordType(IntEnum):
     CLOCK = 8
     WAITS = 9
     NEED = 10
+    WANT = 11
+    GRANT = 12
     LSA = 13
     ROUTE = 14
     TOPIC = 15

@@ -13,6 +13,7 @@ from sdrlinkd.wire import (
     Clock,
     Contact,
     Frame,
+    Grant,
     KeyTold,
     LinkReport,
     Lsa,
@@ -26,6 +27,7 @@ from sdrlinkd.wire import (
     Stamp,
     TopicPiece,
     Waits,
+    Want,
     Wanted,
     build_records,
     crc16,
@@ -34,7 +36,7 @@ from tests.fuzz.targets import KEY, PDU_SIZE
 
 EDGES = (0, 1, 2, 3, 4, 5, 6, 13, 14, 15, 16, 17, 127, 128, 254, 255)
 WORDS = ("0", "-1", "1e999", "nan", '""', "[]", "{}", "true", "9" * 30, '"9 GHz"', "0x7f", "null")
-KINDS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 13, 14, 15, 17, 18, 19, 20, 21, 22, 99)
+KINDS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 17, 18, 19, 20, 21, 22, 99)
 RECORDS = (
     Stamp(1, 2, 3), Stamp(1, 2, 3, asks=True), Beacon(1, 2), Beacon(1, 2, 3),
     RegistryDigest(bytes(8), b"abc"), LinkReport(2, -3, 4, 5), Receipt(1, 2, 1),
@@ -44,6 +46,7 @@ RECORDS = (
     Wanted(1, b"\x10\x11"), Repeat(1, 300, 12, 2),
     Contact(bytes(8), (Met(2, bytes(4), 3),)), KeyTold(1, False, bytes(4)),
     Lsa(1, 7, ((2, 3), (3, 16))), Lsa(255, 0x1234), Route(2, 255, 300, b"\1\3"), Bare(44, b"\xa1"),
+    Want(1, 0, 64, 3, 40, 50), Grant(7, 1, 900, ((1, 9), (5, 0), (255, 3))),
 )  # fmt: skip
 BUILT = [build_records([record]) for record in RECORDS]
 

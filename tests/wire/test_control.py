@@ -17,6 +17,7 @@ from sdrlinkd.wire import (
     Clock,
     Contact,
     Frame,
+    Grant,
     KeyTold,
     LinkReport,
     Lsa,
@@ -30,6 +31,7 @@ from sdrlinkd.wire import (
     Stamp,
     TopicPiece,
     Waits,
+    Want,
     Wanted,
     build_records,
     parse_records,
@@ -52,6 +54,8 @@ NEED = {
     8: 24,
     9: 4,
     10: 6,
+    11: 5,
+    12: 6,
     13: 3,
     14: 6,
     15: 4,
@@ -98,6 +102,10 @@ records = st.one_of(
     st.builds(Beacon, u16, u16, st.none() | u32),
     st.builds(Need, octet, u32, st.binary(min_size=1, max_size=16)),
     st.builds(Bare, octet, st.binary(min_size=1, max_size=16)),
+    st.builds(
+        Want, octet, st.integers(0, 3), st.integers(0, 127), st.integers(0, 127), octet, octet
+    ),
+    st.builds(Grant, octet, octet, u32, st.lists(st.tuples(octet, octet), max_size=124).map(tuple)),
     st.builds(Lsa, octet, u16, st.lists(st.tuples(octet, octet), max_size=126).map(tuple)),
     st.builds(Route, octet, octet, u32, st.binary(max_size=249)),
     st.builds(Repeat, octet, u32, u16, octet),
@@ -146,7 +154,7 @@ def test_unknown_types_are_skipped(pairs, last):
     assert parse_records(payload) == [record for _, record in pairs]
 
 
-@pytest.mark.parametrize("kind", [0, 11, 12, 255])
+@pytest.mark.parametrize("kind", [0, 16, 22, 255])
 def test_reserved_types_are_skipped(kind):
     assert parse_records(bytes([kind, 2, 1, 6, 5, 3, 1, 2, 3])) == [Receipt(1, 2, 3)]
 
@@ -266,6 +274,16 @@ def test_any_bytes_are_records_or_refused():
         Bare(256, bytes(1)),
         Bare(0, b""),
         Bare(0, bytes(17)),
+        Want(256, 0, 0, 0, 0, 0),
+        Want(0, 4, 0, 0, 0, 0),
+        Want(0, 0, 128, 0, 0, 0),
+        Want(0, 0, 0, -1, 0, 0),
+        Want(0, 0, 0, 0, 256, 0),
+        Grant(256, 0, 0),
+        Grant(0, 256, 0),
+        Grant(0, 0, -1),
+        Grant(0, 0, 0, ((256, 0),)),
+        Grant(0, 0, 0, ((0, 0),) * 125),
         Lsa(256, 0),
         Lsa(0, 1 << 16),
         Lsa(0, 0, ((256, 0),)),
