@@ -7,10 +7,10 @@ not touch a PDU: `receive` asks it what to relay, `queue` holds what waits, and 
 records.
 """
 
+from sdrlinkd.link.paths import path, tree
 from sdrlinkd.link.routes.fixed import FixedRoutes
 from sdrlinkd.link.routes.forwarding import Again
 from sdrlinkd.link.routes.params import RelayParams
-from sdrlinkd.link.routes.paths import path, tree
 from sdrlinkd.link.routes.routes import Routes
 from sdrlinkd.link.routes.to_relay import PduToRelay
 

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from sdrlinkd.link.paths import Edges, distances, path, tree
 from sdrlinkd.link.routes.flow import UNANSWERED, Flow
 from sdrlinkd.link.routes.links import Links
 from sdrlinkd.link.routes.named import Ends
-from sdrlinkd.link.routes.paths import Edges, distances, path, tree
 from sdrlinkd.reports import FlowReport
 from sdrlinkd.wire import BROADCAST, PDU_NUMBERS, Need, Route
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from math import inf
 
-from sdrlinkd.link.routes.paths import Edges
+from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.routes.qualities import Qualities
 from sdrlinkd.link.routes.table import LsaTable
 from sdrlinkd.reports import RobotLinksReport

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.routes.fixed import FixedRoutes
 from sdrlinkd.link.routes.flow import ANSWER_S
 from sdrlinkd.link.routes.forwarding import Again, Forwarding
@@ -50,6 +51,7 @@ class Routes:
         self._links = Links(own_id, room, draw if self.is_auto else lambda: 0)
         self._named = Named(own_id)
         self._forwarding = Forwarding(own_id, self._links)
+        self._taken_version = 0
         self._owed: dict[int, float] = {}
         """Since when answers are owed, by source."""
         self._newest: dict[int, int] = {}
@@ -142,6 +144,16 @@ class Routes:
         self._links.look(now)
         self._named.expire(now)
         return self._forwarding.look(now)
+
+    @property
+    def has_new_links(self) -> bool:
+        """Whether the links of the team have changed since they were taken last."""
+        return self._taken_version != self._links.version
+
+    def take_links(self) -> Edges:
+        """The links of the team."""
+        self._taken_version = self._links.version
+        return self._links.edges
 
     @property
     def has_news(self) -> bool:

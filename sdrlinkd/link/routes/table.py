@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 
-from sdrlinkd.link.routes.paths import Edges, distances
+from sdrlinkd.link.paths import Edges, distances
 from sdrlinkd.wire import BROADCAST, LSA_NUMBERS, MAX_LOSS, Lsa, lsa_digest, share_of
 
 MOST_ROBOTS = 32
