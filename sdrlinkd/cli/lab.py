@@ -35,6 +35,7 @@ class Policy(StrEnum):
     CSMA = "csma"
     MINISLOT = "minislot"
     TDMA = "tdma"
+    GRANT = "grant"
 
 
 @app.command()

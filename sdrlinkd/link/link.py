@@ -7,7 +7,8 @@ from random import Random
 import msgspec
 from zstandard import ZstdCompressionDict
 
-from sdrlinkd.link.access import AccessParams
+from sdrlinkd.errors import ConfigError
+from sdrlinkd.link.access import LEAST_PLAN, AccessParams
 from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos
@@ -39,7 +40,7 @@ from sdrlinkd.link.receive import (
 from sdrlinkd.link.repeat import Answers, Asking, RepeatParams
 from sdrlinkd.link.report import NO_NAMES, Names, Reporter
 from sdrlinkd.link.routes import Again, PduToRelay, RelayParams, Routes
-from sdrlinkd.link.schedule import ClassesParams, Forecasts
+from sdrlinkd.link.schedule import ClassesParams, Flow, Forecasts
 from sdrlinkd.link.status import AirUse, Told, Why
 from sdrlinkd.link.timesync import ClockParams, Clocks, Estimate, State, Wall
 from sdrlinkd.link.topics import (
@@ -204,6 +205,12 @@ class Link:
     def attach(self, traits: PduLinkTraits, access: AccessParams, rate: RateParams) -> Fit:
         """Fit the link to a radio that is up. Raises ConfigError and then changes nothing."""
         fit = fit_to(traits, access, rate, self.own_id, self._rng)
+        if fit.settled.policy == "grant" and self._composer.k_single < LEAST_PLAN:
+            raise ConfigError(
+                f"link.pdu_size: got PDUs with {self._composer.k_single} octets for records; "
+                f'allowed with access.policy = "grant": at least {LEAST_PLAN}, for a plan and a '
+                "request"
+            )
         self._team = frozenset(access.nodes)
         self.use(fit)
         return fit
@@ -219,9 +226,11 @@ class Link:
                 fit, self._outbox, self._composer, self._control_records, self._tx_delays,
                 self._forecasts, self._classes, self.own_id, self.registry.has_control,
                 self.sealing, self._answers, self._knows, self._clear_size,
+                self._piggyback,
             )  # fmt: skip
         else:
             self._scheduler.refit(fit)
+        self._scheduler.know_links(self._routes.take_links())
         if fit.is_lockstep:
             # The radio's time starts now, whatever our time was.
             self._outbox.drop_all("tx_radio_down")
@@ -298,7 +307,7 @@ class Link:
                 self._receipts.unknowable(overrides.receipt, topic_id, dst)
         if refused is None:
             qos = overrides.qos if overrides.qos is not None else intake.treatment(topic_id)[0]
-            self._forecasts.note((self.own_id, topic_id), qos, now)
+            self._forecasts.note(Flow(self.own_id, self.own_id, topic_id), qos, now, len(payload))
             self._scheduler.more_to_send()
             if depth := intake.policy(topic_id).latched:
                 kept = Kept(payload, now, overrides._replace(receipt=""))
@@ -575,6 +584,8 @@ class Link:
         refused = self._intake.forward(pdu, data, at, until, number, self._scheduler.bytes_per_s)
         if refused and not is_ours_too:
             self._reception.relay_refused()
+        if not refused:
+            self._scheduler.forwarding(pdu, at)
         self._scheduler.more_to_send()
 
     def _forward_after_all(self, event: PduToRelay) -> None:
@@ -598,6 +609,8 @@ class Link:
             self._scheduler.more_to_send()
 
     def _tell_routes(self, now: float) -> None:
+        if self._routes.has_new_links:
+            self._scheduler.know_links(self._routes.take_links())
         if self._routes.has_news:
             self._control_records.tell_routes(now, self._scheduler.record_pdu_s)
             self._scheduler.more_to_send()

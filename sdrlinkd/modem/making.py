@@ -66,14 +66,15 @@ def modem_on(
 
 
 def _has_slots(config: Config, node_id: int, traits: PduLinkTraits) -> bool:
-    """Whether the access policy will be tdma; errors show when the link is fitted to the radio."""
+    """Whether turns will have fixed times; errors show when the link is fitted to the radio."""
     longest_s = traits.longest_in_use_s(
         RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable
     )
     try:
-        return settle(config.access, node_id, traits, longest_s, Random(0)).policy == "tdma"
+        policy = settle(config.access, node_id, traits, longest_s, Random(0)).policy
     except ConfigError:
         return False
+    return policy in ("tdma", "grant")
 
 
 def _longest_burst_s(config: Config) -> float:

@@ -59,6 +59,10 @@ def supply_of(
         missed_s = max(burst_s, access.step_s)
         gap_s = access.round_s - slot_s + missed_s + decided_s + traits.react_s
         return Supply(gap_s, open_s, access.round_s - open_s)
+    if settled.policy == "grant":
+        # With requests from everybody, a robot has its part of the budget in each round.
+        open_s = max(pdu_s, access.share * access.round_s)
+        return Supply(access.round_s + decided_s + traits.react_s, open_s, access.round_s - open_s)
     if traits.tx_window_s < INFINITE:
         # A message that comes less than `follow` before the end of a TX window misses it.
         closed_s = traits.tx_window_follow_s + traits.rx_window_s

@@ -181,11 +181,11 @@ def test_who_knows_of_a_robot_it_does_not_hear_uses_its_own_slots_only():
     # Robot 2 hears robot 1, and so do we.
     access.heard(2, 12.0, False)
     access.heard(1, 12.0, False)
-    access.told_of(1, 12.0)
-    access.told_of(3, 12.0)
+    access.told_of(1, 12.0, 2)
+    access.told_of(3, 12.0, 2)
     assert begun(access, 12.1) == {1, 2, 3}
     # Now we no longer do.
-    access.told_of(1, 15.0)
+    access.told_of(1, 15.0, 2)
     access.heard(2, 15.0, False)
     assert begun(access, 15.1) == {3}
     # Nobody does.

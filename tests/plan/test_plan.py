@@ -127,7 +127,7 @@ def test_policies_count():
     assert [topic.rate_hz for topic in plan.topics] == [10, 6]
 
 
-@pytest.mark.parametrize("policy", ["csma", "minislot", "tdma"])
+@pytest.mark.parametrize("policy", ["csma", "minislot", "tdma", "grant"])
 def test_robots_that_share_the_air_wait_for_each_other(policy):
     alone, three = (planned("scan:20:1KB", policy=policy, robots=robots) for robots in (1, 3))
     assert three.air > 2.5 * alone.air

@@ -18,18 +18,24 @@ from sdrlinkd.link.access.csma import STEPS as CSMA_STEPS
 from sdrlinkd.link.access.csma import WINDOWS as CSMA_WINDOWS
 from sdrlinkd.link.access.csma import Csma
 from sdrlinkd.link.access.free import Free
+from sdrlinkd.link.access.grant import LEAST_PLAN, Grants
 from sdrlinkd.link.access.idle import idle_words
 from sdrlinkd.link.access.minislot import LEVELS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
+from sdrlinkd.link.access.requests import Due, Waiting, together, waiting_of, want_of
+from sdrlinkd.link.access.round_plan import Times, before, plan, shares
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S, Tdma
 from sdrlinkd.link.access.tdma_states import STEPS as TDMA_STEPS
+from sdrlinkd.link.access.team import places_of
+from sdrlinkd.link.access.turns import Ticks
 
 __all__ = [
     "CLOCK_ERROR_S",
     "CSMA_STEPS",
     "CSMA_WINDOWS",
     "FORGET_S",
+    "LEAST_PLAN",
     "LEVELS",
     "LISTEN_S",
     "LONGEST_APART_S",
@@ -39,17 +45,29 @@ __all__ = [
     "Access",
     "AccessParams",
     "Csma",
+    "Due",
     "Free",
+    "Grants",
     "MiniSlots",
     "Settled",
     "Slot",
     "Tdma",
+    "Ticks",
+    "Times",
+    "Waiting",
     "Wish",
     "after",
+    "before",
     "check_access",
     "idle_words",
     "make_access",
     "may_share",
     "percent",
+    "places_of",
+    "plan",
     "settle",
+    "shares",
+    "together",
+    "waiting_of",
+    "want_of",
 ]

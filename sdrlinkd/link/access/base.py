@@ -4,10 +4,12 @@ import math
 from math import inf
 from typing import NamedTuple, Protocol, Self
 
+from sdrlinkd.link.access.requests import Due, Waiting
 from sdrlinkd.link.access.sightings import Sightings
+from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.traits import Sensed
-from sdrlinkd.wire import Frame
+from sdrlinkd.wire import Frame, Grant, Record, Want
 
 NEVER = -1.0
 MOST_ON_THEIR_WAY = 8
@@ -32,12 +34,18 @@ class Slot(NamedTuple):
 
 
 class Wish(NamedTuple):
-    """A request to send a burst of class `qos`, at least `need_s` long, at `earliest` or later."""
+    """A request to send a burst of class `qos`, at least `need_s` long, at `earliest` or later.
+
+    `waiting` is all that waits, for policies that take requests, and `dues` are the next messages
+    that the team expects, for robots that plan.
+    """
 
     earliest: float
     qos: Qos
     need_s: float
     sensed: Sensed
+    waiting: Waiting | None = None
+    dues: tuple[Due, ...] = ()
 
 
 class Access(Protocol):
@@ -76,6 +84,26 @@ class Access(Protocol):
     def keeps_schedule(self) -> bool:
         """Whether the policy announces a schedule to other robots."""
 
+    @property
+    def takes_requests(self) -> bool:
+        """Whether robots tell each other what waits, and who gets the air for it."""
+
+    @property
+    def plans(self) -> bool:
+        """Whether this robot plans turns for the team now."""
+
+    @property
+    def is_far(self) -> bool:
+        """Whether the robot that plans does not hear us."""
+
+    @property
+    def ahead_s(self) -> float:
+        """How far ahead, in s, requests cover what will wait."""
+
+    @property
+    def tells_at(self) -> float:
+        """Time in s from which the policy itself has something to tell; infinity: nothing."""
+
     def mean_wait_s(self, qos: Qos) -> float:
         """Mean time in s from an idle channel to a burst of class `qos`."""
 
@@ -86,6 +114,22 @@ class Access(Protocol):
 
     def slot(self, wish: Wish) -> Slot | None:
         """The slot in which the requested burst may leave; None: not now."""
+
+    def turn_at(self, earliest: float) -> float:
+        """When we may send next, at `earliest` or later, as far as known; infinity: unknown."""
+
+    @property
+    def must_tell(self) -> bool:
+        """Whether our next burst must tell something."""
+
+    def request(self, start: float, left: Waiting | None) -> Want | None:
+        """What a burst at `start` should ask for, after which `left` waits; None: nothing."""
+
+    def requested(self, want: Want, start: float) -> None:
+        """Note that a burst at `start` asks for something."""
+
+    def told(self, start: float, length_s: float, room: int) -> list[Record]:
+        """What a burst of `length_s` at `start` must tell, in a PDU with `room` octets for it."""
 
     def sent(self, end: float, src: int | None) -> None:
         """Note that our burst will be on the air until `end`.
@@ -99,8 +143,8 @@ class Access(Protocol):
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """Note a PDU of robot `src`, in a burst whose preamble was at `at`, possibly relayed."""
 
-    def told_of(self, node: int, at: float) -> None:
-        """Note that another robot reported at `at` that it hears robot `node`."""
+    def told_of(self, node: int, at: float, by: int) -> None:
+        """Note that robot `by` reported at `at` that it hears robot `node`."""
 
     def beacon(self, src: int, at: float) -> None:
         """Note a beacon that came at `at` directly from robot `src`."""
@@ -110,6 +154,15 @@ class Access(Protocol):
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """Take the schedule that robot `src` announced in a burst whose preamble was at `at`."""
+
+    def take_want(self, want: Want, at: float) -> None:
+        """Take what a robot wants to send, as told directly in a burst at `at`."""
+
+    def take_grant(self, src: int, grant: Grant, at: float) -> None:
+        """Take the turns that robot `src` told, after a FRAME, in a burst at `at`."""
+
+    def know_links(self, edges: Edges) -> None:
+        """Take the links of the team."""
 
     def notices(self, now: float) -> list[str]:
         """What a person should know about the sharing of the channel, in sentences."""
@@ -127,6 +180,18 @@ class BusyChannel:
     step_s = 0.0
     others_follow = False
     keeps_schedule = False
+    takes_requests = False
+    ahead_s = 0.0
+
+    @property
+    def plans(self) -> bool:
+        """No, as no turns are planned."""
+        return False
+
+    @property
+    def is_far(self) -> bool:
+        """No, as nobody plans."""
+        return False
 
     def __init__(self) -> None:
         self._own_ends = [NEVER]
@@ -154,7 +219,7 @@ class BusyChannel:
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """Ignore the source of a burst, as no turn depends on it."""
 
-    def told_of(self, node: int, at: float) -> None:
+    def told_of(self, node: int, at: float, by: int) -> None:
         """Ignore which robots others hear, as no turn depends on it."""
 
     def beacon(self, src: int, at: float) -> None:
@@ -166,6 +231,40 @@ class BusyChannel:
     def take_frame(self, src: int, frame: Frame, at: float) -> None:  # noqa: ARG002  # not all ask
         """Remember that robot `src` keeps a schedule and so uses another policy."""
         self._scheduled.add(src, at)
+
+    @property
+    def tells_at(self) -> float:
+        """Never, as no schedule is planned."""
+        return math.inf
+
+    def turn_at(self, earliest: float) -> float:
+        """At once, as far as known."""
+        return earliest
+
+    @property
+    def must_tell(self) -> bool:
+        """No, as nobody plans."""
+        return False
+
+    def request(self, start: float, left: Waiting | None) -> Want | None:  # noqa: ARG002
+        """What to ask for: nothing, as nobody plans."""
+        return None
+
+    def requested(self, want: Want, start: float) -> None:
+        """Ignore what we ask for, as nobody plans."""
+
+    def told(self, start: float, length_s: float, room: int) -> list[Record]:  # noqa: ARG002
+        """What to tell: nothing, as nobody plans."""
+        return []
+
+    def take_want(self, want: Want, at: float) -> None:
+        """Ignore what a robot wants to send, as nobody is asked."""
+
+    def take_grant(self, src: int, grant: Grant, at: float) -> None:
+        """Ignore turns, as no schedule is kept."""
+
+    def know_links(self, edges: Edges) -> None:
+        """Ignore the links of the team, as no turn depends on them."""
 
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that use another access policy."""

@@ -7,9 +7,12 @@ from sdrlinkd.errors import ConfigError
 from sdrlinkd.link.access.base import Access
 from sdrlinkd.link.access.csma import Csma
 from sdrlinkd.link.access.free import Free
+from sdrlinkd.link.access.grant import Grants
 from sdrlinkd.link.access.minislot import SECTIONS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
+from sdrlinkd.link.access.round_plan import MOST_TURNS, Times
 from sdrlinkd.link.access.tdma import Tdma
+from sdrlinkd.link.access.turns import Ticks
 from sdrlinkd.link.traits import PduLinkTraits
 
 GUARD_SHARE = 0.1
@@ -18,6 +21,13 @@ CLOCK_ERROR_S = 1.5e-4
 """Error in s of two robots' clocks in tdma: 40 ppm while one follows another unheard (FORGET_S)."""
 MARGIN_S = 5e-6
 """Margin in s for multipath and for propagation over about a kilometre."""
+BUDGET_TIMES, BUDGET_S = 4.0, 0.1
+"""grant: airtime of a round beyond the least turns, as a multiple of them, and its limit in s."""
+DRIFT, DRIFT_ROUNDS = 4e-5, 3
+"""grant: how fast two crystals drift apart, and for how many rounds a plan may not be heard."""
+MOST_TICKS = 240
+HEARS_SHARE = 0.1
+"""grant: most time for which the root waits to hear the last turn, as a share of the budget."""
 LONGEST_ROUND_S = 1.0
 LONGEST_APART_S = 0.1
 """Longest reaction time in s of a radio for which listening before sending makes sense."""
@@ -25,7 +35,7 @@ LONGEST_APART_S = 0.1
 
 def check_access(params: AccessParams, own_id: int) -> None:
     """Check what can be checked without a radio. Raises ConfigError."""
-    if params.policy in ("minislot", "tdma") or (params.policy == "auto" and params.nodes):
+    if params.policy in ("minislot", "tdma", "grant") or (params.policy == "auto" and params.nodes):
         if own_id not in params.nodes:
             raise ConfigError(
                 f"access.nodes: got {params.nodes}; allowed with access.policy = "
@@ -73,6 +83,8 @@ def make_access(
                 f"allowed: at most {LONGEST_ROUND_S:g} s: use tdma, or fewer robots"
             )
         return MiniSlots(own_id, params.nodes, minislot_s, detect_s)
+    if params.policy == "grant":
+        return _make_grant(params, own_id, traits, longest_burst_s, rng)
     return _make_tdma(params, own_id, traits, longest_burst_s, apart_s, rng)
 
 
@@ -125,6 +137,31 @@ def _make_tdma(
         detect_s=traits.detect_s + MARGIN_S + CLOCK_ERROR_S,
         gap_s=traits.gap_s,
     )
+
+
+def _make_grant(
+    params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float, rng: Random
+) -> Grants:
+    n = len(params.nodes)
+    turn_s = max(traits.pdu_burst_s) + traits.gap_s
+    react_s = traits.react_s + traits.lead_s + traits.ahead_s + traits.detect_s + MARGIN_S
+    guard_s = traits.turnaround_s + traits.gap_s + MARGIN_S + 2 * traits.index_error_s
+    least_s = react_s + min(n, MOST_TURNS + 1) * (turn_s + guard_s)
+    budget_s = max(least_s, min(BUDGET_TIMES * least_s, BUDGET_S))
+    # Clocks drift apart while some plans are not heard.
+    guard_s += DRIFT * DRIFT_ROUNDS * (budget_s + least_s)
+    # The guard time is a whole number of ticks, so that turns can begin together.
+    guard_s = max(params.guard_s, guard_s)
+    least_tick_s = (budget_s + turn_s) / MOST_TICKS
+    per_guard = max(1, int(guard_s / least_tick_s))
+    tick_us = math.ceil(1e6 * max(least_tick_s, guard_s / per_guard))
+    ticks = Ticks(1e-6 * tick_us, 1e-6 * tick_us * per_guard)
+    guard_s = ticks.guard_s
+    look_s = traits.react_s + (0.0 if traits.is_lockstep else traits.ahead_s)
+    hears_s = max(guard_s, min(traits.lead_s + look_s, HEARS_SHARE * budget_s))
+    longest_s = longest_burst_s + traits.overhead_s
+    times = Times(ticks, turn_s, budget_s, longest_s, hears_s, react_s)
+    return Grants(own_id, params.nodes, times, rng, lead_s=traits.lead_s, look_s=look_s)
 
 
 def _refuse_deaf(params: AccessParams, traits: PduLinkTraits) -> None:

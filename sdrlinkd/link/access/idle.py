@@ -37,6 +37,8 @@ def _why_idle(settled: Settled) -> str:
             f"this robot owns {own:.2g} % of the {1e3 * access.round_s:.3g} ms schedule, and "
             "others left their slots unused"
         )
+    if settled.policy == "grant":
+        return f"this robot waited for its turns, in rounds of up to {1e3 * access.round_s:.3g} ms"
     return NOT_OTHERS
 
 

@@ -11,12 +11,12 @@ Seconds = Annotated[float, Meta(ge=0, le=10)]
 class AccessParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How robots share the channel, the same at all robots; a time of 0 follows from the radio."""
 
-    policy: Literal["auto", "none", "csma", "minislot", "tdma"] = "auto"
+    policy: Literal["auto", "none", "csma", "minislot", "tdma", "grant"] = "auto"
     """Access policy; auto: none if `nodes` lists no other robot, minislot if the radio reacts fast
     enough, else tdma."""
     nodes: list[Annotated[int, Meta(ge=0, le=254)]] = []
-    """Ids of the robots that share the channel, in the same order at all robots; for auto, minislot
-    and tdma."""
+    """Ids of the robots that share the channel, in the same order at all robots; for all policies
+    but none and csma."""
     force: bool = False
     """Whether to accept a policy that carries less than half of what the best policy would."""
     persist: Annotated[float, Meta(gt=0, le=1)] = 0.05
@@ -30,6 +30,6 @@ class AccessParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     slot_s: Seconds = 0.0
     """tdma: length of a robot's slot in s."""
     guard_s: Seconds = 0.0
-    """tdma: guard time at the end of each slot in s."""
+    """tdma, grant: guard time in s at the end of each slot, and after each turn."""
     reuse: bool = True
     """tdma: whether others may use a slot whose owner is silent."""

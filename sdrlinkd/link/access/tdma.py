@@ -119,7 +119,7 @@ class Tdma(BusyChannel):
 
     def slot(self, wish: Wish) -> Slot | None:
         """A time in our own slot, or in one that its owner does not use."""
-        earliest, _, need_s, sensed = wish
+        earliest, _, need_s, sensed = wish[:4]
         if self.role is State.LISTENING:
             if earliest < self._begins_at and not self._is_first(earliest, sensed):
                 return None
@@ -152,7 +152,7 @@ class Tdma(BusyChannel):
         if not is_relayed:
             self._heard_at[src] = at
 
-    def told_of(self, node: int, at: float) -> None:
+    def told_of(self, node: int, at: float, by: int) -> None:  # noqa: ARG002  # not all ask for it
         """Note that robot `node` exists, whether we hear it or not."""
         if node != self._own_id:
             self._told_of_at[node] = at

@@ -23,6 +23,7 @@ from sdrlinkd.link.packing.entry_ids import REST_FACTOR, TopicEntryIds
 from sdrlinkd.link.packing.flush import Flush
 from sdrlinkd.link.packing.head_of_line import HeadOfLine
 from sdrlinkd.link.packing.piggyback import PiggybackRecords
+from sdrlinkd.link.packing.record_pdus import RecordPdus
 from sdrlinkd.link.packing.single_entry import SingleEntry
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import WIRE_BITS, Qos
@@ -35,7 +36,6 @@ from sdrlinkd.wire import (
     PDU_NUMBERS,
     STAMP_SIZE,
     Record,
-    build_records,
     equal_payload,
     flags,
 )
@@ -92,11 +92,16 @@ class Composer:
         self._pdus = 0
         self._entries = 0
         self._bare = BareNumbers()
+        self._record_pdus = RecordPdus(params.pdu_size, piggyback, self._bare, self._finish)
 
-    def fill(self, start: float, allowance: Allowance, source: int | None = None) -> list[BuiltPdu]:
+    def fill(
+        self, start: float, allowance: Allowance, source: int | None = None, *,
+        is_mixed: bool = False,
+    ) -> list[BuiltPdu]:  # fmt: skip
         """The PDUs of a burst whose preamble leaves at `start`; empty if there is nothing to send.
 
-        All PDUs have one source, `source` if given: receivers derive from it who may send next.
+        Unless `is_mixed`, all PDUs have one source, `source` if given: receivers derive from it who
+        may send next.
         """
         built: list[BuiltPdu] = []
         outbox, most_of = self._outbox, allowance.most
@@ -105,11 +110,16 @@ class Composer:
         owed = list(allowance.owed[: max(1, max(most_of) - 1)])
         while levels and len(built) < MAX_PDUS:
             n, first, most = len(built), None, most_of[levels[0].qos]
-            if built:
+            if built and not is_mixed:
                 source = built[0].src
             if owed and n + len(owed) >= most and (n or most < 2):
                 first = owed.pop(0)
-            elif owed and not n and outbox.next_relayed(owed[0]) != outbox.next_relayed():
+            elif (
+                owed
+                and not n
+                and not is_mixed
+                and outbox.next_relayed(owed[0]) != outbox.next_relayed()
+            ):
                 # The owed PDU has another source, so it is sent alone.
                 first, owed, most = owed[0], [], 0
             elif n >= most:
@@ -126,27 +136,19 @@ class Composer:
                 several = (pdu,)
             built += several
         self._pdus += len(built)
-        for pdu in built:
-            self._entries += len(pdu.carried)
+        self._entries += sum(len(pdu.carried) for pdu in built)
         return built
 
-    def fill_with_records(self, start: float, given: Sequence[Record] = ()) -> list[BuiltPdu]:
-        """A PDU with the records `given`, or else with those that wait, for a burst at `start`.
-
-        Empty if there is none.
+    def fill_with_records(
+        self, start: float, given: Sequence[Record] = (), number: int | None = None
+    ) -> list[BuiltPdu]:
+        """A PDU with the records `given`, or else with those that wait, for a burst at `start`;
+        with a `number` that was taken for it, it has both. Empty if there is none.
         """
-        draft = Draft(self._pdu_size)
-        if given:
-            draft.add_record(build_records(given))
-        else:
-            self._piggyback.ride(draft, start, self.next_number)
-        if draft.is_empty:
-            return []
-        draft.address(BROADCAST, Qos.DEFAULT)
-        self._bare.ride(draft, self.next_number)
-        self._bare.note(self.next_number)
-        self._pdus += 1
-        return [self._finish(draft)]
+        at = None if number is None and given else start
+        built = self._record_pdus.built(given, self.next_number if number is None else number, at)
+        self._pdus += len(built)
+        return built
 
     def next_wakeup(self, now: float) -> float:
         """Time at which `fill` may next have something to send; −inf: now; infinity: no traffic."""
@@ -237,7 +239,7 @@ class Composer:
             self._piggyback.ride(draft, start, self.next_number)
         if self._bare.untold:
             self._bare.ride(draft, self.next_number)
-        return self._finish(draft)
+        return self._finish(draft, self.next_number)
 
     def _next_full(self, start: float, most: int, source: int | None) -> list[BuiltPdu]:
         """Up to `most` next PDUs, if each is filled by one fragment of the same message.
@@ -274,12 +276,13 @@ class Composer:
             return self._head_of_line.next_live(lane, start)
         return head
 
-    def _finish(self, draft: Draft) -> BuiltPdu:
+    def _finish(self, draft: Draft, number: int) -> BuiltPdu:
         data = draft.build(
             FLAGS[draft.qos, draft.is_compressed], self._src, draft.dst,
-            self.next_number & 0xFF, self._hop_limit, self._control_entry_id,
+            number & 0xFF, self._hop_limit, self._control_entry_id,
         )  # fmt: skip
-        self.next_number = (self.next_number + 1) % PDU_NUMBERS
+        if number == self.next_number:
+            self.next_number = (number + 1) % PDU_NUMBERS
         self._control_entry_id = (self._control_entry_id + 1) & 0xFF
         return BuiltPdu(data, draft.carried, draft.qos)
 

@@ -96,6 +96,12 @@ class PiggybackRecords:
         self.waiting[key] = _Waiting(build_records([record]), due_at)
         self._note_due()
 
+    def take_back(self, key: tuple[int, ...]) -> bool:
+        """Remove a record that has not ridden; returns whether there was one."""
+        is_there = self.waiting.pop(key, None) is not None
+        self._note_due()
+        return is_there
+
     def put_needs(self, needs: Iterable[Need], due_at: float) -> None:
         """Replace all NEED records that ask for something."""
         for key in [key for key in self.waiting if _asks(key)]:

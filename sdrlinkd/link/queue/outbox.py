@@ -14,7 +14,10 @@ from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue.lives import Lives
 from sdrlinkd.link.queue.message import Lane, Level, Outgoing, QueuedOfTopic
 from sdrlinkd.link.queue.policy import TopicPolicy
-from sdrlinkd.wire import ENTRY_HEADER_SIZE
+from sdrlinkd.wire import ENTRY_HEADER_SIZE, STAMP_SIZE
+
+MESSAGE_OVERHEAD = ENTRY_HEADER_SIZE + STAMP_SIZE
+"""Bytes that a message takes in addition, as the last or only entry of a PDU that it shares."""
 
 
 def _order(lane: Lane) -> tuple[float, int]:
@@ -124,6 +127,24 @@ class Outbox:
     def next_class(self) -> Qos | None:
         """The class of the next message; None if the queue is empty."""
         return self.levels[0].qos if self.levels else None
+
+    @property
+    def next_message(self) -> Outgoing | None:
+        """The next message; None if the queue is empty."""
+        return self.levels[0].lanes[0].head if self.levels else None
+
+    def waiting_bytes(self) -> dict[Qos, int]:
+        """Bytes of each class that wait, in all messages and what is left of those begun, with what
+        an entry and its age take.
+        """
+        waiting = {
+            qos: self._class_bytes[qos] + MESSAGE_OVERHEAD * len(queue)
+            for qos, queue in self._by_class.items()
+        }
+        for message in self._begun():
+            left = max(0, len(message.body) - message.next_index * message.k)
+            waiting[message.qos] += left + MESSAGE_OVERHEAD
+        return waiting
 
     def destinations(self) -> set[int]:
         """Destinations of all messages in the queue, which may include BROADCAST."""

@@ -11,6 +11,7 @@ from sdrlinkd.wire import (
     Beacon,
     Contact,
     Frame,
+    Grant,
     KeyTold,
     LinkReport,
     Parity,
@@ -62,7 +63,7 @@ class HeardRecords:
             elif isinstance(record, TopicPiece):
                 if self._topics.take(src, record):
                     self._completion.declared(src, record.number, now, events)
-            elif isinstance(record, Frame):
+            elif isinstance(record, Frame | Grant):
                 if not is_relayed and not admitted.was_seen and admitted.may_schedule:
                     events.append(RecordHeard(src, record, at))
             elif not admitted.is_proven or isinstance(record, _ELSEWHERE):

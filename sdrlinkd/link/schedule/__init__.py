@@ -13,7 +13,7 @@ from sdrlinkd.link.schedule.allowance import (
     Limits,
 )
 from sdrlinkd.link.schedule.budget import Budget
-from sdrlinkd.link.schedule.forecast import Forecasts
+from sdrlinkd.link.schedule.forecast import Flow, Forecasts
 from sdrlinkd.link.schedule.params import (
     BulkParams,
     ClassesParams,
@@ -34,6 +34,7 @@ __all__ = [
     "ClassParams",
     "ClassesParams",
     "DefaultParams",
+    "Flow",
     "Forecasts",
     "LatencyParams",
     "Limits",

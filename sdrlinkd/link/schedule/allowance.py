@@ -43,6 +43,10 @@ class Allowance(NamedTuple):
         most = (max(0, n - 1) if each < qos else 0 for each, n in zip(Qos, self.most, strict=True))
         return Allowance(tuple(most))
 
+    def fewer(self, n: int) -> "Allowance":
+        """This allowance, less `n` PDUs."""
+        return self._replace(most=tuple(max(0, each - n) for each in self.most))
+
     def least(self, least: Qos) -> "Allowance":
         """This allowance, except that classes less urgent than `least` may only start a burst."""
         most = (n if qos <= least else min(n, 1) for qos, n in zip(Qos, self.most, strict=True))

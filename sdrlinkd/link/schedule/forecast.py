@@ -1,8 +1,8 @@
 """Forecasts when the next message of a periodic topic is due."""
 
-from collections.abc import Hashable
 from dataclasses import dataclass
 from math import inf
+from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
 
@@ -22,6 +22,14 @@ AT_LEAST_S = 1e-4
 """Time in s that is added to a topic's jitter."""
 
 
+class Flow(NamedTuple):
+    """Messages of a topic of robot `src`, as robot `node` sends or relays them."""
+
+    node: int
+    src: int
+    topic_id: int
+
+
 @dataclass(slots=True, eq=False)
 class Forecast:
     """The period and phase of one topic: a line through its messages' times.
@@ -31,6 +39,8 @@ class Forecast:
 
     qos: Qos
     seen_at: float
+    size: int = 0
+    """Bytes of the last message."""
     n: int = 1
     beat_at: float = 0.0
     period_s: float = 0.0
@@ -78,6 +88,15 @@ class Forecast:
         over_s = now - self.beat_at - self.period_s
         return self.spread_s < over_s < self.period_s / 2
 
+    def is_due(self, begin: float, end: float) -> bool:
+        """Whether the next message is urgent, and predicted between two times."""
+        return (
+            self.qos <= Qos.LATENCY
+            and self.is_periodic
+            and self.is_alive(begin)
+            and begin <= self.due(begin) < end
+        )
+
     def due(self, now: float) -> float:
         """Predicted time of the next message; a late one is still expected for `spread_s`."""
         next_at = self.beat_at + self.period_s
@@ -90,12 +109,12 @@ class Forecasts:
     """The topics of this node and of the nodes it hears, with their forecasts."""
 
     def __init__(self) -> None:
-        self._by_key: dict[Hashable, Forecast] = {}
+        self._by_key: dict[Flow, Forecast] = {}
         self.most_urgent = Qos.BULK
         """The most urgent class of any message so far."""
 
-    def note(self, key: Hashable, qos: Qos, at: float) -> None:
-        """Note a message of class `qos`, submitted here or elsewhere at `at` on our clock."""
+    def note(self, key: Flow, qos: Qos, at: float, size: int = 0) -> None:
+        """Note a message of class `qos` and `size` bytes, which came at `at` on our clock."""
         if qos < self.most_urgent:
             self.most_urgent = qos
         found = self._by_key.get(key)
@@ -103,9 +122,10 @@ class Forecasts:
             if len(self._by_key) >= MOST:
                 # Bounds the effort if someone forges PDUs of many robots.
                 del self._by_key[min(self._by_key, key=lambda each: self._by_key[each].seen_at)]
-            self._by_key[key] = Forecast(qos, at)
+            self._by_key[key] = Forecast(qos, at, size)
         elif at > found.seen_at:
             found.note(qos, at)
+            found.size = size
 
     def next_due(self, now: float, below: Qos) -> Forecast | None:
         """The periodic topic more urgent than `below` that is due first; None if there is none."""
@@ -116,6 +136,30 @@ class Forecasts:
                 if at < first_at:
                     first, first_at = each, at
         return first
+
+    def coming(self, node: int, begin: float, end: float, *, is_relayed: bool) -> dict[Qos, int]:
+        """Bytes of each urgent class that robot `node` will have to send between two times.
+
+        `is_relayed`: only of what it relays.
+        """
+        coming: dict[Qos, int] = {}
+        for key, each in self._by_key.items():
+            counts = key.node == node and not (is_relayed and key.src == node)
+            if counts and each.is_due(begin, end):
+                coming[each.qos] = coming.get(each.qos, 0) + each.size
+        return coming
+
+    def of_team(self, begin: float, end: float) -> list[tuple[int, Forecast]]:
+        """The urgent messages that come between two times, and the robots that they come from.
+
+        The first one is that which comes first.
+        """
+        found = [
+            (key.node, each)
+            for key, each in self._by_key.items()
+            if key.node == key.src and each.is_due(begin, end)
+        ]
+        return sorted(found, key=lambda each: each[1].due(begin) + each[1].spread_s)
 
     def is_unforeseen(self, now: float, below: Qos, alive_s: float) -> bool:
         """Whether a topic more urgent than `below` is alive and cannot be predicted now."""

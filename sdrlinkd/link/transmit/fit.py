@@ -39,10 +39,10 @@ def fit_to(
     """Choose access policy and rate control for a radio with these traits. Raises ConfigError."""
     control = RateControl(rate, traits.needed_snr_db, traits.mcs)
     longest_s = traits.longest_in_use_s(control.usable)
-    settled = settle(access, own_id, traits, longest_s, rng)
-    lengths_s = [
+    lengths_s = tuple(
         length_s for mcs, length_s in enumerate(traits.pdu_burst_s) if mcs in control.usable
-    ]
+    )
+    settled = settle(access, own_id, traits._replace(pdu_burst_s=lengths_s), longest_s, rng)
     return Fit(
         settled,
         control,

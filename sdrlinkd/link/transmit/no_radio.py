@@ -2,12 +2,13 @@
 
 from math import inf
 
+from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.receive import PduHeard
 from sdrlinkd.link.traits import Opportunity
 from sdrlinkd.link.transmit.burst import Burst, Outcome
 from sdrlinkd.link.transmit.rate import HeardThere
 from sdrlinkd.link.transmit.report import TransmitReport
-from sdrlinkd.wire import Record
+from sdrlinkd.wire import Pdu, Record
 
 
 class NoRadio:
@@ -35,11 +36,17 @@ class NoRadio:
     def pdu_heard(self, event: PduHeard) -> None:
         """Ignore a PDU, as there is no access policy to inform."""
 
+    def forwarding(self, pdu: Pdu, at: float) -> None:
+        """Ignore a PDU, as there is no access policy to inform."""
+
     def record_heard(self, src: int, record: Record, at: float) -> None:
         """Ignore a record, as there is no access policy to inform."""
 
     def clear(self) -> None:
         """Do nothing, as there are no bursts to retry."""
+
+    def know_links(self, edges: Edges) -> None:
+        """Ignore links, as there is no access policy to inform."""
 
     def access_notices(self, now: float) -> list[str]:  # noqa: ARG002  # the same at any time
         """Notices of the access policy: none, as no policy is in force."""

@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 from sdrlinkd.link.qos import CLASSES, Qos
 from sdrlinkd.link.receive import PduHeard
-from sdrlinkd.link.schedule import Forecasts
+from sdrlinkd.link.schedule import Flow, Forecasts
 from sdrlinkd.link.transmit.fit import Fit
-from sdrlinkd.wire import CONTROL_TOPIC_ID, Beacon, Frame, LinkReport, Record
+from sdrlinkd.wire import CONTROL_TOPIC_ID, Beacon, Frame, Grant, LinkReport, Pdu, Record, Want
 
 Knows = Callable[[int, float], bool]
 """Whether a robot is one of the team: it is in access.nodes, or hears us, too."""
@@ -32,15 +32,30 @@ class Overheard:
         if not is_relayed and self._knows(src, at):
             self._rate.heard(src, at)
         qos = CLASSES[pdu.qos]
-        if not self._access.others_follow or qos > Qos.LATENCY or src == self._own_id:
+        access = self._access
+        uses = access.others_follow or (access.takes_requests and not is_relayed)
+        if not uses or qos > Qos.LATENCY or src == self._own_id:
             return
         # Periodic urgent messages of others need the channel at their times, too.
         ages = {} if is_relayed else {(each.topic_id, each.entry_id): each for each in stamps}
         for entry in pdu.entries:
-            if not entry.index and not (entry.topic_id == CONTROL_TOPIC_ID and self._has_control):
-                stamp = ages.get((entry.topic_id, entry.entry_id))
+            stamp = ages.get((entry.topic_id, entry.entry_id))
+            # The age of a large message comes with its last fragment.
+            is_first = stamp is not None if access.takes_requests else not entry.index
+            if is_first and not (entry.topic_id == CONTROL_TOPIC_ID and self._has_control):
                 origin = at if stamp is None else at - 1e-6 * stamp.age_us
-                self._forecasts.note((src, entry.topic_id), qos, origin)
+                size = entry.total * len(entry.payload)
+                self._forecasts.note(Flow(src, src, entry.topic_id), qos, origin, size)
+
+    def forwarding(self, pdu: Pdu, at: float) -> None:
+        """Note a PDU that we forward: we can ask for the air for the next one in advance."""
+        if not self._access.takes_requests:
+            return
+        for entry in pdu.entries:
+            if not entry.index and entry.total:
+                size = entry.total * len(entry.payload)
+                flow = Flow(self._own_id, pdu.src, entry.topic_id)
+                self._forecasts.note(flow, CLASSES[pdu.qos], at, size)
 
     def record(self, src: int, record: Record, at: float) -> None:
         """Note a record of robot `src` on whom it hears, its presence, or its schedule."""
@@ -49,8 +64,12 @@ class Overheard:
                 if self._knows(src, at):
                     self._rate.take(src, record, at)
             else:
-                self._access.told_of(record.node, at)
+                self._access.told_of(record.node, at, src)
         elif isinstance(record, Beacon):
             self._access.beacon(src, at)
         elif isinstance(record, Frame):
             self._access.take_frame(src, record, at)
+        elif isinstance(record, Grant):
+            self._access.take_grant(src, record, at)
+        elif isinstance(record, Want):
+            self._access.take_want(record, at)

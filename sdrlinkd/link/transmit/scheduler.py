@@ -15,8 +15,9 @@ from itertools import chain
 from math import inf
 from typing import NamedTuple
 
-from sdrlinkd.link.access import Slot, Wish
-from sdrlinkd.link.packing import MAX_PDUS, BuiltPdu, Composer
+from sdrlinkd.link.access import Due, Slot, Wish
+from sdrlinkd.link.packing import MAX_PDUS, BuiltPdu, Composer, PiggybackRecords
+from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outbox
 from sdrlinkd.link.receive import PduHeard
@@ -27,13 +28,14 @@ from sdrlinkd.link.transmit.burst import Burst, Outcome
 from sdrlinkd.link.transmit.control_records import ControlRecords
 from sdrlinkd.link.transmit.fit import Fit
 from sdrlinkd.link.transmit.overheard import Knows, Overheard
+from sdrlinkd.link.transmit.own_turns import OwnTurns
 from sdrlinkd.link.transmit.rate import HeardThere
 from sdrlinkd.link.transmit.repetitions import Repetitions
 from sdrlinkd.link.transmit.report import TransmitReport
 from sdrlinkd.link.transmit.retry import RetryQueue
 from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
 from sdrlinkd.sealing import InTheClear, Sealing
-from sdrlinkd.wire import TICKS_PER_S, Record
+from sdrlinkd.wire import TICKS_PER_S, Pdu, Record
 
 POSTPONED_S = 1e-5
 """Time in s from which a burst counts as postponed."""
@@ -64,8 +66,9 @@ class BurstScheduler:
         self, fit: Fit, outbox: Outbox, composer: Composer, control_records: ControlRecords,
         tx_delays: TxDelayMeters, forecasts: Forecasts, classes: ClassesParams, own_id: int,
         has_control: bool, sealing: Sealing | InTheClear, answers: Answers, knows: Knows,
-        clear_size: int,
+        clear_size: int, piggyback: PiggybackRecords,
     ) -> None:  # fmt: skip
+        self._piggyback = piggyback
         self._knows = knows
         self._answers = answers
         self._outbox = outbox
@@ -108,6 +111,10 @@ class BurstScheduler:
         self._fit = fit
         self._access, self._rate = fit.settled.access, fit.rate
         self._answers.set_slower(fit.slower)
+        self._turns = OwnTurns(
+            fit, self._outbox, self._composer, self._control_records, self._piggyback,
+            self._forecasts, self._own_id,
+        )  # fmt: skip
         self._overheard = Overheard(
             fit, self._forecasts, self._own_id, self._has_control, self._knows
         )
@@ -135,12 +142,17 @@ class BurstScheduler:
                 if burst is not None:
                     self._has_repeated = True
                     return burst
-        if head is None and earliest < records_due_at:
+        if head is None and earliest < records_due_at and not self._tells(earliest):
             return None
         qos, mcs = Qos.DEFAULT if head is None else head, rate.lowest
         if rate.adapts and head is not None:
             mcs = rate.mcs(self._outbox.destinations(), qos, earliest)
-        slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed))
+        waiting, turns = None, self._turns
+        dues: tuple[Due, ...] = ()
+        if access.takes_requests:
+            waiting = turns.waiting(earliest, partial(airtime_s, mcs))
+            dues = turns.dues(earliest, partial(airtime_s, mcs))
+        slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed, waiting, dues))
         if slot is None:
             return None
         start = slot.start
@@ -155,7 +167,12 @@ class BurstScheduler:
         is_timed = frame is not None and records.tells_schedule(start)
         cannot_wait = records.collect(start, frame, rate)
         first_number = composer.next_number
-        built, n_records = self._fill(start, allowance, cannot_wait)
+        if access.takes_requests:
+            built, n_records = turns.fill(
+                slot, allowance, partial(airtime_s, mcs), waiting, cannot_wait=cannot_wait
+            )
+        else:
+            built, n_records = self._fill(start, allowance, cannot_wait)
         if not built:
             if head is not None and allowance.until < inf:
                 since = min(self._held.since, start)
@@ -254,6 +271,9 @@ class BurstScheduler:
         if wakes_at <= now and self._held.is_settled:
             wakes_at = self._held.until
         wakes_at = min(self._control_records.due_at, wakes_at, self._answers.due_at(now))
+        if self._access.takes_requests:
+            earliest = now + self._fit.lead_s
+            wakes_at = min(wakes_at, self._tells_at(earliest) - self._fit.lead_s)
         return max(wakes_at, self._numbers_at)
 
     def clear(self) -> None:
@@ -274,9 +294,17 @@ class BurstScheduler:
         """Note a valid PDU that another robot has sent."""
         self._overheard.pdu(event)
 
+    def forwarding(self, pdu: Pdu, at: float) -> None:
+        """Note a PDU of another robot that we forward, heard at `at`."""
+        self._overheard.forwarding(pdu, at)
+
     def record_heard(self, src: int, record: Record, at: float) -> None:
         """Note a record that another robot has sent to all."""
         self._overheard.record(src, record, at)
+
+    def know_links(self, edges: Edges) -> None:
+        """Take the links of the team, as they are now."""
+        self._access.know_links(edges)
 
     def access_notices(self, now: float) -> list[str]:
         """What a person should know about the access policy, in sentences."""
@@ -304,6 +332,14 @@ class BurstScheduler:
             rate.lowest if rate.adapts else None,
             tuple(rate.changes),
         )
+
+    def _tells_at(self, earliest: float) -> float:
+        """When the access policy has something to tell, though nothing waits; infinity: never."""
+        return min(self._access.tells_at, self._turns.asks_at(earliest))
+
+    def _tells(self, earliest: float) -> bool:
+        """Whether the access policy has something to tell at `earliest`."""
+        return self._access.takes_requests and self._tells_at(earliest) <= earliest
 
     def _again(self, opportunity: Opportunity) -> Burst | None:
         """The first burst of the retry queue in a new slot; None if there is no slot yet."""
@@ -389,16 +425,22 @@ class BurstScheduler:
         one_s, two_s = airtime_s(mcs, 1), airtime_s(mcs, 2)
         if two_s > one_s:
             self.bytes_per_s = self._composer.k_single / (two_s - one_s)
-        allowance = self._limits.allow(
-            slot.start,
-            longest_s if made_by is None else min(longest_s, max(one_s, made_by(slot.start))),
-            partial(airtime_s, mcs),
-            partial(opportunity.most_pdus, mcs),
-            fit.lead_s - access.pause_s,
-            fit.notice_s,
-            access.others_follow,
-            asked,
-        )
+        most_s = longest_s if made_by is None else min(longest_s, max(one_s, made_by(slot.start)))
+        if access.takes_requests:
+            # Turns are short enough for what is urgent.
+            most = opportunity.most_pdus(mcs, most_s)
+            allowance = Allowance(tuple(most if qos in asked else 0 for qos in Qos))
+        else:
+            allowance = self._limits.allow(
+                slot.start,
+                most_s,
+                partial(airtime_s, mcs),
+                partial(opportunity.most_pdus, mcs),
+                fit.lead_s - access.pause_s,
+                fit.notice_s,
+                access.others_follow,
+                asked,
+            )
         if slot.least < Qos.BULK:
             allowance = allowance.least(slot.least)
         if not self._shares.is_owed or one_s > longest_s:

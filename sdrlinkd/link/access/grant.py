@@ -1,0 +1,296 @@
+"""`grant`: one robot of the team gives turns to those that want the most urgent things.
+
+The root plans one round after the other. Each begins with its own turn, in which it tells the plan;
+then all others send in theirs. A robot sends only in turns of a plan that it has heard, so a lost
+plan costs turns and never a collision.
+"""
+
+import math
+from collections.abc import Sequence
+from math import inf
+from random import Random
+from struct import pack
+
+from sdrlinkd.link.access.base import BusyChannel, Slot, Wish
+from sdrlinkd.link.access.known_rounds import KnownRounds
+from sdrlinkd.link.access.leadership import Leadership
+from sdrlinkd.link.access.own_request import OwnRequest
+from sdrlinkd.link.access.planner import Planner
+from sdrlinkd.link.access.requests import Waiting
+from sdrlinkd.link.access.round_plan import Times
+from sdrlinkd.link.access.sightings import Sightings
+from sdrlinkd.link.access.tdma_states import Happens
+from sdrlinkd.link.access.team import Team
+from sdrlinkd.link.access.turns import Turn
+from sdrlinkd.link.paths import Edges
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.wire import (
+    ANYBODY,
+    FRAME_SIZE,
+    GRANT_OVERHEAD,
+    TURN_SIZE,
+    WANT_SIZE,
+    Frame,
+    Record,
+    RecordType,
+    crc16,
+)
+from sdrlinkd.wire import Grant as GrantRecord
+from sdrlinkd.wire import Want as WantRecord
+
+ALMOST_S = 1e-9
+"""Rounding of times, in s."""
+
+
+LEAST_PLAN = FRAME_SIZE + GRANT_OVERHEAD + 4 * TURN_SIZE + WANT_SIZE
+"""Octets for records that a PDU must have: for a plan with four turns, and a request."""
+
+
+class Grants(BusyChannel):
+    """Turns by request, planned by the root: the robot nearest to all, of these the lowest.
+
+    Robots tell the root what waits (WANT). Everybody present gets a short turn, and those with the
+    most urgent messages a longer one. Robots that hear the root tell its plan to those that do not.
+    """
+
+    takes_requests = True
+
+    def __init__(
+        self, own_id: int, nodes: Sequence[int], times: Times, rng: Random, *, lead_s: float,
+        look_s: float,
+    ) -> None:  # fmt: skip
+        super().__init__()
+        self._own_id = own_id
+        self._times = times
+        self._rng = rng
+        self._lead_s = lead_s
+        self._look_s = look_s
+        self.round_s = times.round_s(len(nodes))
+        self.share = times.budget_s / len(nodes) / self.round_s
+        micro = [round(1e6 * each) for each in (*times.ticks, times.turn_s, times.budget_s)]
+        self._schedule = crc16(pack(">BIIII", RecordType.GRANT, *micro) + bytes(sorted(nodes)))
+        self._team = Team(own_id, nodes)
+        begin_s = times.turn_s + times.ticks.guard_s + times.react_s
+        self._leads = Leadership(own_id, self._team, self.round_s, begin_s)
+        self._planner = Planner(own_id, self._team, times)
+        self._request = OwnRequest(own_id, times, self.round_s)
+        self._rounds = KnownRounds(own_id, times.turn_s)
+        self._behind: dict[int, WantRecord] = {}
+        """Requests to pass on to the root."""
+        self._tried = -inf, False
+        """The last turn for anybody, as (its begin, whether we use it)."""
+        self._frame: tuple[int, float, Frame] | None = None
+        """The last FRAME, as (who told it, when, what)."""
+        self._strangers, self._outsiders = Sightings(), Sightings()
+
+    @property
+    def state(self) -> str:
+        """Policy, times, and whose plans are kept, for people."""
+        leads = self._leads
+        doing = "listening for a plan"
+        if leads.is_root:
+            doing = "planned here"
+        elif leads.follows:
+            doing = f"planned by robot {leads.root}"
+            if leads.level > 1:
+                doing += f", {leads.level} hops away"
+        return (
+            f"grant: {len(self._team.nodes)} robots, rounds of at most {1e3 * self.round_s:.3g} "
+            f"ms, guard {1e3 * self._times.ticks.guard_s:.3g} ms; {doing}"
+        )
+
+    def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # the same for all classes
+        """Mean wait in s: half a round."""
+        return self.round_s / 2
+
+    def carries(self, burst_s: float) -> float:
+        """Share of airtime beyond the least turns, less the gaps and guards of bursts."""
+        times = self._times
+        guard_s = times.ticks.guard_s * math.ceil(times.budget_s / burst_s)
+        return max(0.0, times.budget_s - guard_s) / self.round_s
+
+    @property
+    def plans(self) -> bool:
+        """Whether we are the root."""
+        return self._leads.is_root
+
+    @property
+    def is_far(self) -> bool:
+        """Whether we do not hear the root."""
+        return self._leads.level > 1
+
+    @property
+    def tells_at(self) -> float:
+        """Time from which we must be asked, as others wait for the plan."""
+        if self._leads.is_root:
+            return self._planner.tells_at - self._look_s
+        if self._must_pass_on() or self._leads.takes_over:
+            own = (turn for turn in self._rounds.own_turns() if turn.node == self._own_id)
+            return min((turn.begin for turn in own), default=inf) - self._look_s
+        return inf
+
+    def turn_at(self, earliest: float) -> float:
+        """When we may send next, at `earliest` or later, as far as known."""
+        if self._leads.is_root:
+            return max(earliest, self._planner.turn_at)
+        for turn in self._rounds.own_turns():
+            if turn.end > earliest:
+                return max(earliest, turn.begin)
+        return inf if self._leads.follows else earliest
+
+    def slot(self, wish: Wish) -> Slot | None:
+        """Our turn, from its begin or from `earliest` on."""
+        earliest, leads = wish.earliest, self._leads
+        # While our last burst is on the air, `earliest` is not the present.
+        latest = min(earliest, wish.sensed.until + self._lead_s) + self._look_s
+        if leads.begins(earliest, wish.sensed):
+            self._begin_anew()
+            self._planner.begin(earliest)
+        if leads.is_root:
+            return None if self._planner.turn_at >= latest else self._planner.slot(wish)
+        for turn in self._rounds.own_turns():
+            start = max(turn.begin, earliest)
+            if start + wish.need_s <= turn.end + ALMOST_S:
+                if start >= latest:
+                    # Too early: decide at the last query before that start.
+                    return None
+                if turn.node == ANYBODY and not self._tries(turn):
+                    continue
+                if leads.takes_over and turn.node == self._own_id:
+                    leads.begin(start, Happens.LOSES)
+                    self._planner.begin(start)
+                return Slot(start, turn.end, turn.end)
+        return None
+
+    @property
+    def must_tell(self) -> bool:
+        """Whether our next burst tells the plan, or requests of robots behind us."""
+        if self._leads.is_root:
+            return self._planner.tells
+        return self._must_pass_on() or bool(self._behind)
+
+    def request(self, start: float, left: Waiting | None) -> WantRecord | None:
+        """What to ask the root for, unless it knows."""
+        if self._leads.is_root or left is None:
+            return None
+        return self._request.of(left, start)
+
+    def requested(self, want: WantRecord, start: float) -> None:
+        """Note what the root knows from now on."""
+        self._request.told(want, start)
+
+    def told(self, start: float, length_s: float, room: int) -> list[Record]:
+        """The plan of the next round, or the one that we pass on, with requests to pass on."""
+        leads = self._leads
+        if leads.is_root:
+            most = max(0, room - FRAME_SIZE - GRANT_OVERHEAD) // TURN_SIZE
+            leads.look(start)
+            # Until its end, the round of a root that we have taken over from goes on.
+            last = self._rounds.last
+            grant, made = self._planner.plan(start, length_s, leads.rank[0], most, last)
+            self._rounds.made(made)
+            return [Frame(self._own_id, 0, self._schedule, 0), grant]
+        records: list[Record] = []
+        plan = self._rounds.pass_on() if self._must_pass_on() else None
+        if plan is not None:
+            phase_us = max(0, round(1e6 * (start - plan[0])))
+            records += [Frame(leads.root, leads.level, self._schedule, phase_us), plan[1]]
+        records += self._behind.values()
+        self._behind.clear()
+        return records
+
+    def sent(self, end: float, src: int | None) -> None:
+        """Note that, as the root, our turn lasts at least until `end`."""
+        super().sent(end, src)
+        self._planner.sent(end)
+
+    def not_sent(self, start: float) -> None:
+        """Plan anew if the burst with the plan did not leave."""
+        super().not_sent(start)
+        if self._planner.not_sent(start):
+            self._rounds.forget()
+
+    def heard(self, src: int, at: float, is_relayed: bool) -> None:
+        """Note that we hear robot `src` directly."""
+        if not is_relayed:
+            self._team.heard(src, at)
+
+    def told_of(self, node: int, at: float, by: int) -> None:
+        """Note that robot `by` hears robot `node`."""
+        self._team.told_of(node, at, by)
+
+    def know_links(self, edges: Edges) -> None:
+        """Take the links of the team, as its LSAs tell them."""
+        self._team.learn(edges)
+
+    def take_frame(self, src: int, frame: Frame, at: float) -> None:
+        """Remember whose plan the next GRANT of this burst tells."""
+        self._frame = None
+        if src not in self._team.nodes or frame.root not in self._team.nodes:
+            # It may be anybody's; those in `nodes` are who share the channel.
+            self._outsiders.add(src, at)
+        elif frame.schedule != self._schedule:
+            self._strangers.add(src, at)
+        else:
+            self._strangers.clear(src)
+            self._frame = src, at, frame
+
+    def take_want(self, want: WantRecord, at: float) -> None:
+        """Take what a robot wants, or pass it on to the root."""
+        if want.node not in self._team.nodes or want.node == self._own_id:
+            return
+        if self._leads.is_root:
+            self._planner.take(want, at)
+        elif self._team.places(self._leads.root).is_behind(want.node, self._own_id):
+            self._behind[want.node] = want
+
+    def take_grant(self, src: int, grant: GrantRecord, at: float) -> None:
+        """Follow a plan of the best root known, as robot `src` told it."""
+        if self._frame is None or self._frame[:2] != (src, at):
+            return
+        frame = self._frame[2]
+        since = at - 1e-6 * frame.phase_us
+        found = self._times.ticks.round(grant.number, since + 1e-6 * grant.begins_us, grant.turns)
+        if not found.is_sound(at, 2 * self.round_s):
+            return
+        has_turn = any(turn.node == self._own_id for turn in found.turns)
+        follows, is_new = self._leads.take(src, frame, grant.reach, at, has_turn=has_turn)
+        if is_new:
+            self._begin_anew()
+        last = self._rounds.last
+        if follows and self._rounds.take(since, grant, found):
+            self._request.given(found)
+            if last is not None:
+                self.ahead_s = min(max(0.0, found.begin - last.begin), self.round_s)
+
+    def notices(self, now: float) -> list[str]:
+        """Sentences on robots that keep another schedule."""
+        outside = [
+            f"robot {src} announces a schedule and is ignored: it or the schedule's root is not in "
+            "access.nodes; list all robots there, at every robot, or look who sends it"
+            for src in self._outsiders.lately(now)
+        ]
+        differing = [
+            f"robot {src} keeps a different schedule; give both the same [access], and radios of "
+            f"one kind (ours: {self.state})"
+            for src in self._strangers.lately(now)
+        ]
+        return outside + differing
+
+    def _begin_anew(self) -> None:
+        """Forget the rounds of another root."""
+        self._rounds.forget()
+        self._request.forget()
+
+    def _must_pass_on(self) -> bool:
+        """Whether a robot in the plan has to hear it from us, and has not yet."""
+        places = self._team.places(self._leads.root)
+        return self._leads.follows and self._rounds.must_pass_on(places)
+
+    def _tries(self, turn: Turn) -> bool:
+        """Whether to send in a turn for anybody: at random, as others may do so, too."""
+        if self._tried[0] != turn.begin:
+            here = {*self._rounds.nodes(), self._leads.root}
+            absent = sum(node not in here for node in self._team.nodes)
+            self._tried = turn.begin, self._rng.random() * absent < 1
+        return self._tried[1]

@@ -1,0 +1,72 @@
+"""The rounds that a robot knows of, and its turns in them."""
+
+from collections.abc import Iterator
+
+from sdrlinkd.link.access.team import Places
+from sdrlinkd.link.access.turns import Round, Turn
+from sdrlinkd.wire import ANYBODY, Grant
+
+
+class KnownRounds:
+    """The rounds that go on or will begin, as far as robot `own_id` knows them.
+
+    Two plans whose rounds begin less than `same_s` apart may be the same.
+    """
+
+    def __init__(self, own_id: int, same_s: float) -> None:
+        self._own_id = own_id
+        self._same_s = same_s
+        self._rounds: list[Round] = []
+        self.plan: tuple[float, Grant] | None = None
+        """The root's last plan, and the time from which its begin counts."""
+        self._passed_on = -1
+        """Number of the round whose plan we passed on last."""
+
+    @property
+    def last(self) -> Round | None:
+        """The last round that is known."""
+        return self._rounds[-1] if self._rounds else None
+
+    def forget(self) -> None:
+        """Begin anew with another root."""
+        self._rounds, self.plan = [], None
+
+    def made(self, found: Round) -> None:
+        """Go on with a round of our own."""
+        self._rounds = [found]
+
+    def take(self, since: float, grant: Grant, found: Round) -> bool:
+        """Take the round of a plan that counts from `since`; returns whether it is a new one."""
+        last = self.last
+        is_same = last is not None and last.number == found.number
+        if is_same and abs(self._rounds[-1].begin - found.begin) < self._same_s:
+            # Another robot has passed on the same plan.
+            return False
+        self.plan = since, grant
+        self._rounds = [*(each.until(found.begin) for each in self._rounds[-1:]), found]
+        return True
+
+    def own_turns(self) -> Iterator[Turn]:
+        """The turns in which we may send, in order."""
+        for each in self._rounds:
+            yield from each.of(self._own_id)
+
+    def nodes(self) -> set[int]:
+        """The robots with turns."""
+        return {turn.node for each in self._rounds for turn in each.turns}
+
+    def must_pass_on(self, places: Places) -> bool:
+        """Whether a robot in the last plan has to hear it from us, and has not yet."""
+        if self.plan is None or self.plan[1].number == self._passed_on:
+            return False
+        return any(
+            node == ANYBODY or places.is_behind(node, self._own_id)
+            for node, ticks in self.plan[1].turns
+            if ticks
+        )
+
+    def pass_on(self) -> tuple[float, Grant] | None:
+        """The plan, which is passed on now, and the time from which its begin counts."""
+        if self.plan is not None:
+            self._passed_on = self.plan[1].number
+        return self.plan

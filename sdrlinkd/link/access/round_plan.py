@@ -1,0 +1,176 @@
+"""Plans a round: which robots get a turn, how long, and in which order.
+
+Every robot that is present gets a turn in which a PDU fits, so that it can send something urgent or
+ask for more. In teams of more than nine, these turns go round. The robots that want the most
+urgent things share a budget of airtime on top of that. Robots that do not hear the root come after
+the robot that passes the plan on to them.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from math import inf
+from typing import NamedTuple
+
+from sdrlinkd.link.access.requests import Due, Waiting, rank
+from sdrlinkd.link.access.team import Places
+from sdrlinkd.link.access.turns import Ticks
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.wire import ANYBODY, MAX_AIR
+
+MOST_TURNS = 8
+"""Most robots with a turn in one round, beside the root."""
+SPARE_TURNS = 2
+"""Turns of a round beyond one for each robot: for those who are not here, and a second one."""
+MIDDLE = 64
+"""The priority of messages of which no request tells it."""
+STANDS = 0.5
+"""Share of a round's budget that passes between two turns of a robot that does not want any."""
+
+
+class Times(NamedTuple):
+    """The times of a schedule, in s."""
+
+    ticks: Ticks
+    turn_s: float
+    """The least turn: a burst of one PDU."""
+    budget_s: float
+    """Airtime of a round beyond the least turns."""
+    longest_s: float
+    """The longest burst."""
+    hears_s: float
+    """From the last turn until that of the root, which forwards what it has heard."""
+    react_s: float
+    """From the end of the PDU with the plan until the first turn, at least."""
+
+    def round_s(self, n: int) -> float:
+        """The longest round of `n` robots, some of which pass plans on, with the root's turn."""
+        others = min(n - 1, MOST_TURNS)
+        least_s = self.turn_s + self.ticks.guard_s + self.ticks.tick_s
+        turns_s = (others + SPARE_TURNS) * least_s + (2 + others) * self.turn_s
+        return turns_s + self.budget_s + self.react_s + self.hears_s
+
+
+def shares(
+    times: Times,
+    waiting: Mapping[int, Waiting],
+    had_s: Mapping[int, float],
+    most: int = MOST_TURNS + 1,
+) -> dict[int, float]:
+    """The airtime in s that each robot gets beyond its least turn, of those that want more.
+
+    Nobody's bulk comes before what is urgent for others. Where the class is not urgent, the robot
+    comes first that had the least airtime for that lately, `had_s`. Ages would not do, as a relay
+    does not know those of all messages.
+    """
+    parts = []
+    for node, each in waiting.items():
+        is_urgent = each.qos <= Qos.LATENCY
+        since = -each.age_s if is_urgent else had_s.get(node, 0.0)
+        parts.append((each.qos, -each.priority, since, node, each.air_s))
+        parts.append((Qos.BULK, -MIDDLE, had_s.get(node, 0.0), node, each.lower_air_s))
+    left_s, given = times.budget_s, dict[int, float]()
+    for *_, node, part_s in sorted(parts):
+        given_s = min(part_s, left_s)
+        if given_s > 0 and (node in given or len(given) < most):
+            given[node] = given.get(node, 0.0) + given_s
+            left_s -= given_s
+    return given
+
+
+def plan(
+    times: Times,
+    begin: float,
+    present: Collection[int],
+    given: Mapping[int, float],
+    waiting: Mapping[int, Waiting],
+    places: Places,
+    served_at: Mapping[int, float],
+    *,
+    is_open: bool,
+) -> list[tuple[int, int]]:
+    """The turns of a round from `begin` on in order, as (robot, ticks), after the root's own.
+
+    `present` are the other robots, `given` what some get beyond the least turn. `served_at` tells
+    when each had its last turn. With `is_open`, there is a turn for anybody else.
+    """
+    count, guard_s = times.ticks.count, times.ticks.guard_s
+    tellers = set(places.parents.values())
+
+    def ticks(node: int) -> int:
+        """A turn in which a robot can tell what it must, beside what it is given."""
+        least_s = times.turn_s * (1 + (node in tellers))
+        return min(count(least_s + given.get(node, 0.0)), MAX_AIR)
+
+    def heard(nodes: Sequence[int], before: Collection[int] = ()) -> list[int]:
+        """These robots, nearer ones first, and those from which some hear of their turns."""
+        found = [node for node in nodes if node in present]
+        for node in found:
+            by = places.parents.get(node)
+            if by is not None and by in present and by not in found and by not in before:
+                found.append(by)
+        return sorted(found, key=lambda node: places.levels.get(node, 1))
+
+    runs = heard(sorted(given, key=lambda node: (*_urgency(waiting.get(node)), node)))
+    turns = [(node, ticks(node)) for node in runs]
+    ends = {turn.node: turn.end for turn in times.ticks.round(0, begin, turns).turns}
+    end = max(ends.values(), default=begin)
+    # Rounds are short while something urgent is due; then not everybody needs a turn in each.
+    rest = [
+        node
+        for node in present
+        if ends.get(node, served_at.get(node, -inf)) < end + guard_s - STANDS * times.budget_s
+    ]
+    # Whoever had no turn for the longest time comes first, if there are too many.
+    rest.sort(key=lambda node: (ends.get(node, served_at.get(node, -inf)), node))
+    most = min(len(present), MOST_TURNS) + SPARE_TURNS - 1 - len(runs)
+    rest = heard(sorted(rest[: max(0, most)]), runs)
+    turns += [(node, count(times.turn_s * (1 + (node in tellers)))) for node in rest]
+    return [*turns, (ANYBODY, count(times.turn_s))] if is_open else turns
+
+
+def _urgency(wants: Waiting | None) -> tuple[object, ...]:
+    return (len(Qos), 0, 0.0) if wants is None else rank(wants)
+
+
+def before(
+    dues: Sequence[Due],
+    root: int,
+    ticks: Ticks,
+    begin: float,
+    turns: list[tuple[int, int]],
+    turn_s: float,
+) -> list[tuple[int, int]]:
+    """The turns of a round from `begin` on, changed so that messages find turns when they are due.
+
+    `dues` are in order of time. The robot that the first one comes from gets the last turn, so that
+    the root can forward it at once; so do those of messages that are due together with it. Turns
+    longer than `turn_s` end before; if the first one comes too soon for that, there are no others.
+    If the round is over long before, it stays as it is.
+    """
+    first, least = dues[0], ticks.count(turn_s)
+    rest = [turn for turn in turns if turn[0] != first.node or turn[1] > 2 * least]
+
+    def end_of(told: list[tuple[int, int]]) -> float:
+        return ticks.round(0, begin, told).end
+
+    if end_of(rest) < first.at - 2 * turn_s:
+        return turns
+    if first.at < begin + 2 * turn_s:
+        rest = []
+    for i in range(len(rest) - 1, -1, -1):
+        node, length = rest[i]
+        over_s = end_of(rest) - first.at
+        if over_s > 0 and length > least:
+            rest[i] = node, max(least, length - ticks.count(over_s))
+    for due in dues:
+        at = end_of(rest)
+        if due.at > at + 2 * turn_s and due is not first:
+            break
+        if due.node == root:
+            # The root has the next turn anyway.
+            continue
+        if due.at > at:
+            # A turn of the root, which it does not use: nobody begins something else.
+            pause = max(1, int((due.at - at - ticks.guard_s) / ticks.tick_s))
+            rest.append((root, min(pause, MAX_AIR)))
+        rest.append((due.node, min(ticks.count(due.air_s), MAX_AIR)))
+    return rest

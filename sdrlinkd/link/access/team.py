@@ -1,0 +1,120 @@
+"""The team as one robot knows it: who is here, who hears whom, and who hears plans from whom."""
+
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from math import inf
+from typing import NamedTuple
+
+from sdrlinkd.link.paths import Edges, distances
+from sdrlinkd.wire import FAR
+
+PRESENT_S = 3.5
+"""Time in s after which a robot that was not heard is gone: three periods of its beacon."""
+
+
+class Places(NamedTuple):
+    """Where robots are, as seen from the root: hops from there, and who passes plans on to them.
+
+    Those that hear the root itself are not in `parents`.
+    """
+
+    levels: Mapping[int, int]
+    parents: Mapping[int, int]
+
+    def is_behind(self, node: int, relay: int) -> bool:
+        """Whether robot `node` hears plans through `relay`, directly or through others."""
+        by = self.parents.get(node)
+        while by is not None and by != relay:
+            by = self.parents.get(by)
+        return by == relay
+
+
+class Team:
+    """The robots `nodes`: presence, and links, which count as equally good both ways.
+
+    LSAs tell links only where routes are found. So reports and our own receiver count, too.
+    """
+
+    def __init__(self, own_id: int, nodes: Sequence[int]) -> None:
+        self.nodes = sorted(nodes)
+        self._own_id = own_id
+        self._seen_at: dict[int, float] = {}
+        self._lsa_edges: Edges = {}
+        self._link_at: dict[tuple[int, int], float] = {}
+        self._expired_at = 0.0
+        self._places: dict[int, Places] = {}
+
+    def heard(self, node: int, at: float) -> None:
+        """Note that we hear a robot directly."""
+        if node in self.nodes and node != self._own_id:
+            self._seen_at[node] = at
+            self._link(self._own_id, node, at)
+
+    def told_of(self, node: int, at: float, by: int) -> None:
+        """Note that robot `by` hears robot `node`."""
+        if {node, by} <= set(self.nodes) and node != by:
+            self.seen(node, at)
+            self._link(by, node, at)
+
+    def seen(self, node: int, at: float) -> None:
+        """Note that a robot of the team is here, wherever it is."""
+        if node != self._own_id:
+            self._seen_at[node] = at
+
+    def learn(self, edges: Edges) -> None:
+        """Take the links that LSAs tell."""
+        self._lsa_edges = edges
+        self._places.clear()
+
+    def present(self, now: float) -> list[int]:
+        """The other robots that are here, in ascending order: heard, told of, or in LSAs."""
+        since, linked, own = now - PRESENT_S, self._lsa_edges, self._own_id
+        return [
+            node
+            for node in self.nodes
+            if node != own and (self._seen_at.get(node, -inf) > since or linked.get(node))
+        ]
+
+    def places(self, root: int) -> Places:
+        """Where robots are from `root`: each hears plans on its best path."""
+        found = self._places.get(root)
+        if found is None:
+            found = self._places[root] = places_of(root, self._edges())
+        return found
+
+    def reach(self, root: int, others: Collection[int]) -> int:
+        """Hops from `root` to the farthest of `others`; FAR if that is not known."""
+        levels = self.places(root).levels
+        return min(FAR, max((levels.get(node, FAR) for node in others), default=FAR))
+
+    def _link(self, one: int, other: int, at: float) -> None:
+        link = min(one, other), max(one, other)
+        if link not in self._link_at or at > self._expired_at + PRESENT_S:
+            self._expired_at = at
+            fresh = {each: told for each, told in self._link_at.items() if told > at - PRESENT_S}
+            self._link_at = fresh
+            self._places.clear()
+        self._link_at[link] = at
+
+    def _edges(self) -> Edges:
+        known = {node: dict(links) for node, links in self._lsa_edges.items()}
+        edges: defaultdict[int, dict[int, float]] = defaultdict(dict, known)
+        for one, other in self._link_at:
+            edges[one].setdefault(other, 1.0)
+            edges[other].setdefault(one, 1.0)
+        return edges
+
+
+def places_of(root: int, edges: Edges) -> Places:
+    """Where robots are from `root`, over the best paths."""
+    _, parents = distances(edges, root)
+    levels = {root: 0}
+
+    def level(node: int) -> int:
+        if node not in levels:
+            levels[node] = 1 + level(parents[node])
+        return levels[node]
+
+    for node in parents:
+        level(node)
+    return Places(levels, {node: by for node, by in parents.items() if by != root})

@@ -1,0 +1,371 @@
+"""`grant`: nobody clashes, everybody has a turn in time, and the team finds another root."""
+
+from itertools import pairwise
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sdrlinkd.errors import ConfigError
+from sdrlinkd.link import Qos, Sensed
+from sdrlinkd.link.access import (
+    Ticks,
+    Times,
+    Waiting,
+    Wish,
+    make_access,
+    places_of,
+    plan,
+    shares,
+    together,
+    waiting_of,
+    want_of,
+)
+from sdrlinkd.wire import ANYBODY, Frame, Grant, Want, build_records
+from tests.laws import law
+from tests.link.radios import params
+from tests.link.turns import LONGEST_S, PDU_S, ROOM, TRAITS, Team
+
+FORMED_S = 3.0
+TIMES = Times(Ticks(1e-4, 2e-4), PDU_S, 0.02, LONGEST_S, 3e-4, 5e-4)
+CHAIN = {(1, 2), (2, 3)}
+BRIDGE = {(1, 2), (2, 3), (3, 4), (4, 5), (2, 5)}
+
+
+def saturated(n, seed, **more):
+    team = Team(list(range(1, n + 1)), seed, **more)
+    for robot in team.robots.values():
+        robot.bulk_s = 1e3
+    return team
+
+
+def with_urgent(team, node, begin_s, end_s, per_s=10.0):
+    at = begin_s
+    while (at := at + team.rng.expovariate(per_s)) < end_s:
+        team.robots[node].urgent_at.append(at)
+
+
+@pytest.mark.parametrize("n", [2, 3, 8, 12])
+@pytest.mark.parametrize("loss", [0.0, 0.2])
+def test_nobody_clashes_and_the_air_is_used(n, loss):
+    team = saturated(n, seed=n, loss=loss)
+    team.run(FORMED_S + 2)
+    assert team.roots() == {1}
+    assert team.clashes(FORMED_S) == []
+    used_s = sum(each.end - each.begin for each in team.bursts if each.begin > FORMED_S)
+    assert used_s > (0.75 if not loss else 0.5) * 2
+    if not loss:
+        assert {each.src for each in team.bursts} == set(team.robots)
+
+
+@pytest.mark.parametrize("n", [2, 5, 9])
+def test_whoever_has_something_urgent_waits_for_a_round_at_most(n):
+    """All others have more bulk than the air carries."""
+    team = saturated(n, seed=n)
+    for node in team.robots:
+        with_urgent(team, node, FORMED_S, FORMED_S + 4, per_s=3.0)
+    team.run(FORMED_S + 5)
+    round_s = team.robots[1].access.round_s
+    assert len(team.waits_s) > 5 * n
+    assert max(wait_s for _, _, wait_s in team.waits_s) <= round_s
+
+
+@pytest.mark.parametrize("links", [CHAIN, BRIDGE], ids=["chain", "bridge"])
+def test_robots_that_do_not_hear_each_other_never_send_at_once(links):
+    nodes = {node for link in links for node in link}
+    for seed in range(3):
+        team = saturated(len(nodes), seed, links=links, loss=0.02)
+        team.run(FORMED_S / 2)
+        team.tell_links()
+        team.run(2 * FORMED_S + 2)
+        assert team.roots() == {2}, "nobody is farther than two hops from it"
+        assert team.clashes(2 * FORMED_S) == []
+        late = {each.src for each in team.bursts if each.begin > 2 * FORMED_S}
+        assert late == nodes
+
+
+def test_the_robot_in_the_middle_plans():
+    for middle in (1, 2, 3):
+        ends = [node for node in (1, 2, 3) if node != middle]
+        team = Team([1, 2, 3], 5, links={(middle, end) for end in ends})
+        team.run(2 * FORMED_S)
+        assert team.roots() == {middle}
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.1])
+def test_when_the_root_dies_another_plans_within_three_rounds(loss):
+    for seed in range(4):
+        team = saturated(5, seed, loss=loss)
+        team.run(FORMED_S)
+        team.robots[1].is_on = False
+        died_s = team.t
+        team.run(died_s + 1)
+        round_s = team.robots[2].access.round_s
+        planned = [each for each in team.bursts if each.begin > died_s + round_s and each.records]
+        first = min(each.begin for each in planned)
+        assert len(team.roots()) == 1
+        if not loss:
+            assert team.roots() == {2}
+        assert first - died_s < 3 * round_s
+        assert team.clashes(died_s + 4 * round_s) == []
+        assert {each.src for each in team.bursts if each.begin > died_s + 0.5} == {2, 3, 4, 5}
+
+
+def test_robots_join_and_the_lowest_takes_over_without_a_clash():
+    for seed in range(4):
+        team = saturated(4, seed, joins={1: 4.0, 3: 5.0})
+        team.run(3.9)
+        assert team.roots() == {2}
+        team.run(9.0)
+        assert team.roots() == {1}
+        assert {each.src for each in team.bursts if each.begin > 8} == {1, 2, 3, 4}
+        # Two robots that are not here yet may use the same turn for anybody.
+        assert len(team.clashes(4.0)) <= 3
+
+
+def test_a_team_that_has_nothing_to_send_is_quiet():
+    team = Team([1, 2, 3, 4], 1)
+    team.run(FORMED_S + 2)
+    late = [each for each in team.bursts if each.begin > FORMED_S]
+    assert {each.src for each in late} == {1, 2, 3, 4}
+    assert sum(each.src != 1 for each in late) < 4 * 4
+
+
+def test_two_teams_that_meet_become_one():
+    for seed in range(3):
+        apart = {(1, 3), (2, 4)}
+        team = saturated(4, seed, links=set(apart))
+        team.run(FORMED_S)
+        assert team.roots() == {1, 2}
+        team._links |= {(1, 2), (1, 4), (2, 3), (3, 4)}
+        team.run(FORMED_S + 6)
+        assert team.roots() == {1}
+        assert team.clashes(FORMED_S + 5) == []
+
+
+def test_a_plan_that_cannot_be_meant_is_refused():
+    team = Team([1, 2], 1)
+    access = team.robots[2].access
+    good = Frame(1, 0, access._schedule, 0)
+    for frame, grant in [
+        (good, Grant(1, 1, 10**9, ((2, 10),))),
+        (good, Grant(1, 1, 1000, ((2, 10), (255, 0), (2, 5)))),
+        (good, Grant(1, 1, 1000, ((2, 255),) * 100)),
+        (good._replace(schedule=good.schedule ^ 1), Grant(1, 1, 1000, ((2, 10),))),
+        (good._replace(root=9), Grant(1, 1, 1000, ((2, 10),))),
+    ]:
+        access.take_frame(1, frame, 5.0)
+        access.take_grant(1, grant, 5.0)
+        assert access.turn_at(5.0) == 5.0, "it still listens"
+        assert "listening" in access.state
+    access.take_frame(1, good, 5.0)
+    access.take_grant(1, Grant(1, 1, 1000, ((2, 10),)), 5.1)
+    assert "listening" in access.state, "a GRANT of another burst"
+    access.take_grant(1, Grant(1, 1, 1000, ((2, 10),)), 5.0)
+    assert access.turn_at(5.0) == pytest.approx(5.001)
+    assert "planned by robot 1" in access.state
+
+
+def test_who_keeps_other_times_is_told_of():
+    access = Team([1, 2], 1).robots[2].access
+    access.take_frame(1, Frame(1, 0, access._schedule ^ 1, 0), 5.0)
+    access.take_frame(9, Frame(9, 0, access._schedule, 0), 5.0)
+    notices = access.notices(6.0)
+    assert len(notices) == 2
+    assert "robot 9" in notices[0]
+    assert "robot 1" in notices[1]
+
+
+def test_own_id_must_be_listed():
+    with pytest.raises(ConfigError, match=r"access\.nodes"):
+        make_access(params("grant", [2, 3]), 1, TRAITS, LONGEST_S, Random(1))
+
+
+waitings = st.builds(
+    Waiting,
+    st.sampled_from(Qos),
+    st.integers(0, 127),
+    st.floats(0, 10),
+    st.floats(1e-4, 1.0),
+    st.floats(0, 1.0),
+).map(lambda each: each._replace(lower_air_s=0.0) if each.qos is Qos.BULK else each)
+"""Nothing is lower than bulk."""
+
+
+@law()
+@given(st.dictionaries(st.integers(1, 12), waitings, max_size=9))
+def test_what_is_urgent_for_anybody_comes_before_all_bulk(waiting):
+    given_s = shares(TIMES, waiting, {})
+    assert sum(given_s.values()) <= TIMES.budget_s + 1e-9
+    classes = sorted({each.qos for each in waiting.values()})
+    if classes and sum(given_s.values()) < TIMES.budget_s - 1e-9:
+        return
+    urgent = [node for node, each in waiting.items() if each.qos == min(classes, default=0)]
+    needs_s = sum(waiting[node].air_s for node in urgent)
+    has_s = sum(min(given_s.get(node, 0.0), waiting[node].air_s) for node in urgent)
+    assert has_s >= min(needs_s, TIMES.budget_s) - 1e-9
+
+
+@law()
+@given(
+    st.sets(st.integers(2, 20), min_size=1, max_size=12),
+    st.dictionaries(st.integers(2, 20), waitings, max_size=8),
+    st.dictionaries(st.integers(2, 20), st.floats(0, 9), max_size=12),
+    st.lists(st.tuples(st.integers(1, 20), st.integers(1, 20)), max_size=30),
+    st.booleans(),
+)
+def test_a_plan(present, waiting, served_at, links, is_open):
+    """Turns do not overlap, fit the longest round, and come after that of who tells of them."""
+    edges = {}
+    for one, other in links:
+        edges.setdefault(one, {})[other] = 1.0
+        edges.setdefault(other, {})[one] = 1.0
+    places = places_of(1, edges)
+    waiting = {node: each for node, each in waiting.items() if node in present}
+    turns = plan(
+        TIMES,
+        10.0,
+        present,
+        shares(TIMES, waiting, {}),
+        waiting,
+        places,
+        served_at,
+        is_open=is_open,
+    )
+    made = TIMES.ticks.round(1, 10.0, turns)
+    assert all(
+        after.begin >= turn.end + TIMES.ticks.guard_s - 1e-9 for turn, after in pairwise(made.turns)
+    )
+    assert {turn.node for turn in made.turns} <= {*present, ANYBODY}
+    assert (ANYBODY in {turn.node for turn in made.turns}) == is_open
+    first = {}
+    for turn in made.turns:
+        first.setdefault(turn.node, turn.begin)
+    for node, begin in first.items():
+        by = places.parents.get(node)
+        if by in present:
+            assert first[by] < begin
+    old = {node for node in present if served_at.get(node, 0) < 9}
+    if len(present) <= 8:
+        assert old <= set(first), "who had no turn for long has one"
+
+
+@law()
+@given(waitings, st.floats(0, 3))
+def test_what_is_sent_is_taken_off(waiting, sent_s):
+    left = waiting.without(sent_s)
+    if left is None:
+        assert sent_s >= waiting.all_s - 1e-9
+    else:
+        assert left.all_s == pytest.approx(waiting.all_s - sent_s)
+        assert left.qos >= waiting.qos
+
+
+@law()
+@given(waitings, waitings)
+def test_two_requests_together(one, other):
+    both = together(one, other)
+    assert both.qos == min(one.qos, other.qos)
+    assert both.all_s == pytest.approx(one.all_s + other.all_s)
+
+
+@law()
+@given(waitings)
+def test_a_request_survives_the_air(waiting):
+    told = waiting_of(want_of(3, waiting))
+    assert (told.qos, told.priority) == (waiting.qos, waiting.priority)
+    assert waiting.air_s <= told.air_s * (1 + 1e-9) <= max(6e-5, 1.1 * waiting.air_s)
+    assert waiting_of(want_of(3, None)) is None
+
+
+def test_a_plan_never_has_more_turns_than_a_pdu_has_room_for():
+    team = saturated(12, 3)
+    team.run(1.0)
+    robot = team.robots[1]
+    for room in (ROOM, 40, 30, 18, 5):
+        (_, grant) = robot.access.told(robot.clock(team.t), PDU_S, room)
+        assert 10 + 8 + 2 * len(grant.turns) <= max(room, 18)
+
+
+@pytest.mark.parametrize("links", [None, CHAIN])
+def test_no_round_is_longer_than_the_longest(links):
+    for n in (3, 8, 12) if links is None else (3,):
+        team = saturated(n, n, links=links)
+        for node in team.robots:
+            with_urgent(team, node, 0.0, 4.0, per_s=20.0)
+        team.run(1.0)
+        team.tell_links()
+        team.run(5.0)
+        root = team.robots[min(team.roots())]
+        bursts = sorted(team.bursts)
+        # A round begins with the first burst of the root's turn.
+        begins = [
+            each.begin
+            for last, each in pairwise(bursts)
+            if each.src == root.id != last.src and each.begin > FORMED_S
+        ]
+        assert len(begins) > 20
+        assert max(b - a for a, b in pairwise(begins)) <= root.access.round_s
+
+
+def test_where_a_burst_has_a_single_pdu_the_root_sends_too():
+    team = saturated(3, 2, traits=TRAITS._replace(longest_burst_s=(PDU_S,)))
+    team.run(FORMED_S + 2)
+    air_s = dict.fromkeys(team.robots, 0.0)
+    for each in team.bursts:
+        if each.begin > FORMED_S:
+            air_s[each.src] += each.end - each.begin
+    assert team.clashes(FORMED_S) == []
+    assert min(air_s.values()) > 0.2 * 2
+
+
+octet = st.integers(0, 255)
+told = st.one_of(
+    st.tuples(st.just("frame"), octet, octet, octet, st.booleans(), st.integers(0, 10**6)),
+    st.tuples(
+        st.just("grant"),
+        octet,
+        octet,
+        octet,
+        st.one_of(st.integers(0, 50_000), st.integers(0, 2**32 - 1)),
+        st.lists(st.tuples(st.sampled_from([0, 1, 2, 3, 9, 255]), octet), max_size=20),
+    ),
+    st.tuples(st.just("want"), octet, st.integers(0, 3), octet, octet),
+    st.tuples(st.just("of"), octet, octet),
+    st.tuples(st.just("links"), octet, octet),
+)
+
+
+@law()
+@given(st.lists(told, max_size=40), st.integers(1, 3))
+def test_whatever_is_told_turns_stay_within_bounds(events, own_id):
+    access = make_access(params("grant", [1, 2, 3]), own_id, TRAITS, LONGEST_S, Random(1))
+    now = 1.0
+    for kind, *fields in events:
+        now += 0.003
+        src = fields[0] % 4
+        if kind == "frame":
+            _, root, level, is_ours, phase_us = fields
+            schedule = access._schedule if is_ours else 1
+            access.take_frame(src, Frame(root % 4, level, schedule, phase_us), now)
+        elif kind == "grant":
+            _, number, reach, begins_us, turns = fields
+            at = now - 0.003 if number % 2 else now
+            access.take_grant(src, Grant(number, reach, begins_us, tuple(turns)), at)
+        elif kind == "want":
+            access.take_want(Want(src, fields[1], 64, 1, *fields[2:]), now)
+        elif kind == "of":
+            access.told_of(src, now, fields[1] % 4)
+        else:
+            access.know_links({src: {fields[1] % 4: 1.0}, fields[1] % 4: {src: 1.0}})
+        waiting = Waiting(Qos.LATENCY, 64, 0.1, 0.002, 0.5)
+        slot = access.slot(Wish(now, Qos.LATENCY, PDU_S, Sensed(now, now - 1.0), waiting))
+        assert access.tells_at >= 0
+        if slot is not None:
+            assert now <= slot.start <= slot.end <= slot.start + 2 * access.round_s
+            records = access.told(slot.start, PDU_S, ROOM)
+            assert len(build_records(records)) <= ROOM + 7 * 3
+            access.sent(slot.start + PDU_S, None)
+    assert access.state
+    assert all(isinstance(each, str) for each in access.notices(now))
