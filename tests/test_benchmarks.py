@@ -50,7 +50,13 @@ ROWS = {
         "images_delivered_2pct_random_pct",
         "urgent_lost_twice_pct",
     },
-    "team": {"reroute_s", "reroute_to_all_s"},
+    "team": {
+        "chain3_seed_mdr_laser", "chain3_seed_mdr_image", "chain3_seed_mdr_joystick",
+        "chain3_seed_laser_D_ms", "chain3_seed_joystick_D_ms",
+        "grant_halfduplex_50ms_urgent_p99_over_frame_standing",
+        "grant_halfduplex_50ms_urgent_p99_over_frame_request",
+        "reroute_s", "reroute_to_all_s",
+    },
     "modem_path": {
         "odom_30hz_latency_ms_p50",
         "odom_30hz_latency_ms_p99",

@@ -2,7 +2,9 @@
 
 import pytest
 
+from benchmarks.team.chain import carry
 from benchmarks.team.healing import heal
+from benchmarks.team.turnaround import wait_for_turns
 from tests.laws import trials
 
 
@@ -14,3 +16,22 @@ def test_a_route_heals_in_time_and_nothing_is_lost(to_all):
         assert found.back_s < 0.4
         assert found.lost == 0
         assert found.control_share < 0.02
+
+
+@pytest.mark.slow
+def test_the_papers_chain_with_its_joystick_loses_nothing():
+    for seed in range(11, 11 + trials(1)):
+        found = carry("grant", seed, 8.0)
+        assert found.mdr == (1.0, 1.0, 1.0)
+        laser_s, _, joystick_s = found.mean_s
+        # The first messages come before their period is known.
+        assert laser_s < 0.008
+        assert joystick_s < 0.008
+
+
+@pytest.mark.slow
+def test_something_urgent_waits_for_a_round_where_radios_turn_round_slowly():
+    for size, most in ((64, 1.2), (2048, 2.3)):
+        found = wait_for_turns(size, 3, 20.0)
+        assert found.p99_s < most * found.longest_round_s
+        assert found.mdr == 1

@@ -5,11 +5,15 @@ from collections.abc import Iterator
 from statistics import median
 
 from benchmarks.report import Row, main
+from benchmarks.team.chain import Carried, carry
 from benchmarks.team.healing import PERIOD_S, heal
+from benchmarks.team.turnaround import wait_for_turns
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
     """Measure all rows; `quick` takes a tenth of the trials."""
+    yield from _chain(seed, quick)
+    yield from _turnaround(seed, quick)
     n = 2 if quick else 20
     for name, to_all in (("reroute_s", False), ("reroute_to_all_s", True)):
         found = [heal(seed + i, to_all=to_all) for i in range(n)]
@@ -24,6 +28,43 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
             note=(
                 f"five robots, {1 / PERIOD_S:g} Hz over three hops, tdma; the worst of all trials: "
                 "from the death of the relay until the first message that was sent after it"
+            ),
+        )  # fmt: skip
+
+
+def _chain(seed: int, quick: bool) -> Iterator[Row]:
+    duration_s = 8.0 if quick else 210.0
+    ours = carry("grant", seed, duration_s)
+    others: dict[str, Carried] = {
+        policy: carry(policy, seed, duration_s if quick else 30.0)
+        for policy in ("tdma", "minislot", "csma")
+    }
+    note = (
+        "the paper's chain: laser (1 KiB, 50 Hz) and image (64 KiB, every 300 ms) one way, the "
+        "joystick (64 B, 10 Hz) back; the ends do not hear each other; policy grant"
+    )
+    for i, (name, target) in enumerate((("laser", 0.9999), ("image", 0.999), ("joystick", 0.9999))):
+        yield Row(
+            f"chain3_seed_mdr_{name}", ours.mdr[i], "ratio", target, "more", ours.sent[i],
+            peers={policy: each.mdr[i] for policy, each in others.items()}, note=note,
+        )  # fmt: skip
+    for i, name in ((0, "laser"), (2, "joystick")):
+        yield Row(
+            f"chain3_seed_{name}_D_ms", 1e3 * ours.mean_s[i], "ms", 6.0, "less", ours.sent[i],
+            peers={policy: 1e3 * each.mean_s[i] for policy, each in others.items()}, note=note,
+        )  # fmt: skip
+
+
+def _turnaround(seed: int, quick: bool) -> Iterator[Row]:
+    for name, size, target in (("standing", 64, 1.2), ("request", 2048, 2.3)):
+        found = wait_for_turns(size, seed, 30.0 if quick else 300.0)
+        rounds = found.p99_s / found.longest_round_s
+        yield Row(
+            f"grant_halfduplex_50ms_urgent_p99_over_frame_{name}", rounds, "rounds", target, "less",
+            found.n, peers={"mdr": found.mdr, "longest_round_ms": 1e3 * found.longest_round_s},
+            note=(
+                "five radios, turnaround 50 ms; four have more bulk than the air carries, the "
+                f"fifth sends {size} B at random, once a second; a frame is the longest round"
             ),
         )  # fmt: skip
 

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations
 from random import Random
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from backends import AirParams, LinkOverride, RadioParams, World
 from benchmarks.worlds.arrivals import Arrival
@@ -37,6 +37,9 @@ CDR = b"\0\1\0\0"
 TOPIC_TYPE = "std_msgs/msg/UInt8MultiArray"
 
 
+Policy = Literal["csma", "minislot", "tdma", "grant"]
+
+
 class Flow(NamedTuple):
     """`n` messages of `size` octets that robot `src` sends every `period_s` from `begin_s` on.
 
@@ -51,6 +54,17 @@ class Flow(NamedTuple):
     n: int
     begin_s: float
     counted_at: int = BROADCAST
+    qos: Literal["urgent", "latency", "default", "bulk"] = "default"
+    is_random: bool = False
+    """Whether the messages come at random, every `period_s` on average."""
+
+    def times(self, rng: Random) -> list[float]:
+        """When the messages are sent, in s."""
+        at, times = self.begin_s, []
+        for _ in range(self.n):
+            times.append(at)
+            at += rng.expovariate(1 / self.period_s) if self.is_random else self.period_s
+        return times
 
 
 @dataclass
@@ -61,17 +75,29 @@ class Heard:
     sent_at: Sequence[float]
     at: dict[int, float] = field(default_factory=dict)
 
+    @property
+    def mdr(self) -> float:
+        """Messages that came over messages sent."""
+        return len(self.at) / self.flow.n
+
+    @property
+    def delays_s(self) -> list[float]:
+        """Of the messages that came."""
+        return [at - self.sent_at[number] for number, at in self.at.items()]
+
 
 class Team:
-    """Robots `ids`, of which the pairs in `links` hear each other both ways; tdma."""
+    """Robots `ids`, of which the pairs in `links` hear each other both ways."""
 
     def __init__(
         self, ids: Iterable[int], links: Collection[tuple[int, int]], flows: Sequence[Flow],
-        seed: int,
+        seed: int, policy: Policy = "tdma", pdu_size: int = PDU_SIZE,
+        turnaround_s: float = TURNAROUND_S,
     ) -> None:  # fmt: skip
+        self._pdu_size = pdu_size
         self.ids = list(ids)
         self.heard = [
-            Heard(flow, [flow.begin_s + flow.period_s * i for i in range(flow.n)]) for flow in flows
+            Heard(flow, flow.times(Random(1000 * seed + i))) for i, flow in enumerate(flows)
         ]
         chance = Random(seed)
         air = AirParams(rate_hz=RATE_HZ, block_s=MODEM.block_s, snr_db=GOOD_DB)
@@ -83,7 +109,7 @@ class Team:
         registry = make_registry([(flow.name, TOPIC_TYPE) for flow in flows])
         radios = {
             node: RadioParams(
-                full_duplex=False, turnaround_s=TURNAROUND_S,
+                full_duplex=False, turnaround_s=turnaround_s,
                 clock_ppm=chance.uniform(-CLOCK_PPM, CLOCK_PPM),
             )
             for node in self.ids
@@ -94,8 +120,8 @@ class Team:
             radios,
             {node: self._link(node, registry, seed) for node in self.ids},
             MODEM,
-            Airtimes(MODEM, PDU_SIZE),
-            AccessParams(policy="tdma", nodes=self.ids),
+            Airtimes(MODEM, pdu_size),
+            AccessParams(policy=policy, nodes=self.ids, force=True),
             {node: self._arrivals(node) for node in self.ids},
             seed=seed,
             listen=self._listen,
@@ -118,7 +144,7 @@ class Team:
 
     def _link(self, node: int, registry: Registry, seed: int) -> Link:
         link = Link(
-            LinkParams(pdu_size=PDU_SIZE, hop_limit=HOP_LIMIT),
+            LinkParams(pdu_size=self._pdu_size, hop_limit=HOP_LIMIT),
             QueueParams(),
             ReassemblyParams(),
             registry,
@@ -128,7 +154,12 @@ class Team:
             clock=ClockParams(),
             repeat=RepeatParams(),
         )
-        link.set_policies({i: TopicPolicy(dst=each.flow.dst) for i, each in enumerate(self.heard)})
+        link.set_policies(
+            {
+                i: TopicPolicy(dst=each.flow.dst, qos=each.flow.qos)
+                for i, each in enumerate(self.heard)
+            }
+        )
         return link
 
     def _arrivals(self, node: int) -> list[Arrival]:

@@ -264,6 +264,8 @@ def _next_chance(
     slots before that, at its mini-slots after their start or after the end of a burst in them.
     """
     policy, traits = station.settled.access, station.traits
+    if policy.takes_requests:
+        return max(t, policy.turn_at(t + traits.lead_s) - traits.lead_s - traits.react_s)
     frame = policy.frame(t + traits.lead_s)
     carrier_end = -INFINITE if sensed.burst_at is None else sensed.idle_since
     if name in ("csma", "minislot"):
