@@ -4,6 +4,7 @@ import pytest
 
 from benchmarks.team.chain import carry
 from benchmarks.team.healing import heal
+from benchmarks.team.teams import Flow, Team
 from benchmarks.team.turnaround import wait_for_turns
 from tests.laws import trials
 
@@ -35,3 +36,15 @@ def test_something_urgent_waits_for_a_round_where_radios_turn_round_slowly():
         found = wait_for_turns(size, 3, 20.0)
         assert found.p99_s < most * found.longest_round_s
         assert found.mdr == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("policy", ["tdma", "grant"])
+def test_a_relay_asks_for_what_it_lacks(policy):
+    """At 6.4 dB, some PDUs in a hundred are lost on each hop."""
+    flows = [Flow("scan", 1, 3, 1024, 0.1, 150, 4.0, qos="latency")]
+    team = Team((1, 2, 3), ((1, 2), (2, 3)), flows, 1, policy, 288, snr_db=6.4)
+    team.simulation.run(21.0)
+    (scan,) = team.heard
+    assert team.repeats(2).asked > 5
+    assert scan.mdr == 1

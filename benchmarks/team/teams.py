@@ -23,7 +23,7 @@ from sdrlinkd.link import (
     TopicPolicy,
 )
 from sdrlinkd.modem import Airtimes
-from sdrlinkd.reports import LinkReport
+from sdrlinkd.reports import LinkReport, RepeatReport
 from sdrlinkd.wire import BROADCAST, Registry, make_registry
 
 RATE_HZ = 5e6
@@ -92,7 +92,7 @@ class Team:
     def __init__(
         self, ids: Iterable[int], links: Collection[tuple[int, int]], flows: Sequence[Flow],
         seed: int, policy: Policy = "tdma", pdu_size: int = PDU_SIZE,
-        turnaround_s: float = TURNAROUND_S,
+        turnaround_s: float = TURNAROUND_S, snr_db: float = GOOD_DB,
     ) -> None:  # fmt: skip
         self._pdu_size = pdu_size
         self.ids = list(ids)
@@ -100,7 +100,7 @@ class Team:
             Heard(flow, flow.times(Random(1000 * seed + i))) for i, flow in enumerate(flows)
         ]
         chance = Random(seed)
-        air = AirParams(rate_hz=RATE_HZ, block_s=MODEM.block_s, snr_db=GOOD_DB)
+        air = AirParams(rate_hz=RATE_HZ, block_s=MODEM.block_s, snr_db=snr_db)
         deaf = [
             LinkOverride(sender=a, receiver=b, snr_db=NONE_DB)
             for a, b in permutations(self.ids, 2)
@@ -133,6 +133,10 @@ class Team:
             if (flow.src, flow.dst) == (src, dst):
                 return flow.forwarded_by
         return []
+
+    def repeats(self, node: int) -> RepeatReport:
+        """What a robot repeated and asked for."""
+        return self._report(node).repeats
 
     def control_share(self) -> float:
         """Airtime of all PDUs that hold only records, as a share of the time so far."""

@@ -64,6 +64,8 @@ class PduPlaced(NamedTuple):
     skipped: Sequence[int]
     is_wanted: bool
     at: float
+    is_ours: bool = True
+    """Whether it is for this robot, too, not only to be forwarded."""
 
 
 Event = Delivered | PduHeard | RecordHeard | Newcomer | Ended | PduPlaced | PduToRelay

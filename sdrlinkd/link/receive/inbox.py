@@ -143,7 +143,8 @@ class Inbox:
         to_relay = self._relaying.judge(read, admitted, first_at, track, is_ours=is_ours)
         is_relay = to_relay is not None and not to_relay.is_spare
         if track.is_numbered:
-            events.append(PduPlaced(read, track.number, track.skipped, is_ours or is_relay, at))
+            is_wanted = is_ours or is_relay
+            events.append(PduPlaced(read, track.number, track.skipped, is_wanted, at, is_ours))
         if to_relay is not None:
             events.append(to_relay)
             if is_relay and not is_ours:

@@ -221,7 +221,9 @@ class Asking:
         patience_s = RELAYED_PATIENCE_S if source.hears_relays else PATIENCE_S
         held: frozenset[Message] = frozenset()
         for number in event.skipped[-MOST_MISSING:]:
-            if before is not None and number == before.number + 1:
+            # A relay holds no messages; it lacks whatever it has to forward.
+            is_ours = event.is_ours and before is not None and before.is_ours
+            if is_ours and before is not None and number == before.number + 1:
                 held = inside(before, event)
             source.missing[number % PDU_NUMBERS] = _Missing(event.at, event.at + patience_s, held)
         while len(source.missing) > MOST_MISSING:
