@@ -15,6 +15,8 @@ OPEN_S = 0.25
 """Longest time in s between two turns for robots that are not here yet."""
 LATELY_S = 1.0
 """Time in s in which airtime that was given is forgotten to 37 %."""
+ALMOST_S = 1e-9
+"""Rounding of times, in s."""
 NUMBERS = 256
 """Count of the numbers of rounds, which wrap around."""
 
@@ -82,7 +84,7 @@ class Planner:
             end = start + times.turn_s
         elif not self._turn_began <= start < end:
             self._turn_began, end = start, start + self._length_s(wish.waiting, start)
-        end = max(end, start + wish.need_s)
+        end = max(end, start + wish.need_s + ALMOST_S)
         data_end = end - times.turn_s
         self.tells = end - start <= times.longest_s or start + wish.need_s > data_end
         if self.tells:

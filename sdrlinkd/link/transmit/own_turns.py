@@ -12,6 +12,7 @@ from sdrlinkd.link.access import Access, Due, Slot, Waiting, together
 from sdrlinkd.link.packing import BuiltPdu, Composer, PiggybackRecords
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outbox
+from sdrlinkd.link.repeat import Answers
 from sdrlinkd.link.schedule import Allowance, Forecasts
 from sdrlinkd.link.transmit.control_records import ControlRecords
 from sdrlinkd.link.transmit.fit import Fit
@@ -19,6 +20,11 @@ from sdrlinkd.wire import BROADCAST, RecordType
 
 ALMOST_S = 1e-9
 """Rounding of times, in s."""
+
+MIDDLE = 64
+"""The priority with which air is requested for repeats."""
+MOST_REPEATED = 8
+"""Most PDUs to repeat for which air is requested at a time."""
 
 AirtimeOf = Callable[[int], float]
 """The airtime in s of a burst of so many PDUs."""
@@ -29,8 +35,9 @@ class OwnTurns:
 
     def __init__(
         self, fit: Fit, outbox: Outbox, composer: Composer, control_records: ControlRecords,
-        piggyback: PiggybackRecords, forecasts: Forecasts, own_id: int,
+        piggyback: PiggybackRecords, forecasts: Forecasts, answers: Answers, own_id: int,
     ) -> None:  # fmt: skip
+        self._answers = answers
         self._fit = fit
         self._access: Access = fit.settled.access
         self._outbox = outbox
@@ -41,12 +48,19 @@ class OwnTurns:
         self._own_id = own_id
 
     def waiting(self, now: float, airtime_s: AirtimeOf) -> Waiting | None:
-        """What waits here at `now`, with its airtime; None: nothing."""
-        head = self._outbox.next_message
-        if head is None:
-            return None
-        age_s, n_bytes = max(0.0, now - head.arrived_at), self._outbox.waiting_bytes()
-        return self._needing(head.qos, head.priority, age_s, n_bytes, airtime_s)
+        """What waits here at `now`, to be sent or repeated, with its airtime; None: nothing."""
+        head, found = self._outbox.next_message, None
+        if head is not None:
+            age_s, n_bytes = max(0.0, now - head.arrived_at), self._outbox.waiting_bytes()
+            found = self._needing(head.qos, head.priority, age_s, n_bytes, airtime_s)
+        repeated = None
+        if self._answers.wanted:
+            repeated = self._answers.due_class(now, self._composer.next_number)
+        if repeated is None:
+            return found
+        # With a PDU that says how old they are.
+        n_pdus = 1 + min(len(self._answers.wanted), MOST_REPEATED)
+        return together(found, Waiting(repeated, MIDDLE, 0.0, airtime_s(n_pdus)))
 
     def dues(self, now: float, airtime_s: AirtimeOf) -> tuple[Due, ...]:
         """The next urgent messages of the team that can be predicted and come soon, in order."""

@@ -11,7 +11,7 @@ sent again, unchanged except for the ages inside, before a new one is composed.
 
 from collections import Counter
 from functools import partial
-from itertools import chain
+from itertools import accumulate, chain
 from math import inf
 from typing import NamedTuple
 
@@ -113,7 +113,7 @@ class BurstScheduler:
         self._answers.set_slower(fit.slower)
         self._turns = OwnTurns(
             fit, self._outbox, self._composer, self._control_records, self._piggyback,
-            self._forecasts, self._own_id,
+            self._forecasts, self._answers, self._own_id,
         )  # fmt: skip
         self._overheard = Overheard(
             fit, self._forecasts, self._own_id, self._has_control, self._knows
@@ -219,7 +219,7 @@ class BurstScheduler:
             planned_start=start,
             n_timed=len(pdus) * self._has_control,
             inner=inner,
-            numbers=list(range(first_number, first_number + len(built))),
+            numbers=self._numbers(built, first_number),
         )
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
@@ -472,6 +472,11 @@ class BurstScheduler:
             seal(plain, start) if plain else pdu for pdu, plain in zip(pdus, inner, strict=True)
         ]
         return sealed, inner
+
+    def _numbers(self, built: list[BuiltPdu], first: int) -> list[int]:
+        """The number of each PDU of ours, from `first` on; those between are of no meaning."""
+        ours = accumulate(pdu.src == self._own_id for pdu in built)
+        return [first + n - 1 for n in ours]
 
     def _relayed_src(self, pdus: list[bytes]) -> int | None:
         """The robot whose PDUs a burst relays; None: our own."""
