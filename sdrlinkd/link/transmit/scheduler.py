@@ -195,6 +195,11 @@ class BurstScheduler:
         classes = [pdu.qos for pdu in built]
         self._spend(length_s, classes)
         pdus = [pdu.data for pdu in built]
+        numbers = list(range(first_number, first_number + len(built)))
+        if access.takes_requests:
+            # PDUs of others may be between ours, which then follow each other.
+            ours = accumulate(pdu.src == self._own_id for pdu in built)
+            numbers = [first_number + n - 1 for n in ours]
         inner: list[bytes] = []
         if sealing.is_on:
             pdus, inner = self._sealed(pdus, start)
@@ -219,7 +224,7 @@ class BurstScheduler:
             planned_start=start,
             n_timed=len(pdus) * self._has_control,
             inner=inner,
-            numbers=self._numbers(built, first_number),
+            numbers=numbers,
         )
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
@@ -472,11 +477,6 @@ class BurstScheduler:
             seal(plain, start) if plain else pdu for pdu, plain in zip(pdus, inner, strict=True)
         ]
         return sealed, inner
-
-    def _numbers(self, built: list[BuiltPdu], first: int) -> list[int]:
-        """The number of each PDU of ours, from `first` on; those between are of no meaning."""
-        ours = accumulate(pdu.src == self._own_id for pdu in built)
-        return [first + n - 1 for n in ours]
 
     def _relayed_src(self, pdus: list[bytes]) -> int | None:
         """The robot whose PDUs a burst relays; None: our own."""
