@@ -1,5 +1,6 @@
 """The paper's chain of three robots, with its joystick: both ways over a relay, on one channel."""
 
+from random import Random
 from typing import NamedTuple
 
 from benchmarks.team.teams import Flow, Policy, Team
@@ -21,9 +22,10 @@ class Carried(NamedTuple):
 
 def carry(policy: Policy, seed: int, duration_s: float) -> Carried:
     """Send laser and images from robot 1 to 3, and the joystick back, for `duration_s`."""
+    rng = Random(seed)
 
     def flow(name: str, src: int, dst: int, size: int, period_s: float, qos: str) -> Flow:
-        begin_s = BEGIN_S + 1e-3 * ((7 * seed + size) % 20)
+        begin_s = BEGIN_S + rng.uniform(0, 0.02)
         n = round(duration_s / period_s)
         return Flow(name, src, dst, size, period_s, n, begin_s, qos=qos)  # type: ignore[arg-type]
 

@@ -242,7 +242,7 @@ class Simulation:
                     pair.age_sum_s += age_s
                     pair.ages_s.append(age_s)
                 self._listen(node, message, self.now)
-            if link.relays:
+            if link.relays or station.settled.access.by_request is not None:
                 self._look(station, self._block(self.now))
 
     def _tick(self) -> None:
@@ -264,8 +264,8 @@ def _next_chance(
     slots before that, at its mini-slots after their start or after the end of a burst in them.
     """
     policy, traits = station.settled.access, station.traits
-    if policy.takes_requests:
-        return max(t, policy.turn_at(t + traits.lead_s) - traits.lead_s - traits.react_s)
+    if policy.by_request is not None:
+        return max(t, policy.by_request.turn_at(t + traits.lead_s) - traits.lead_s - traits.react_s)
     frame = policy.frame(t + traits.lead_s)
     carrier_end = -INFINITE if sensed.burst_at is None else sensed.idle_since
     if name in ("csma", "minislot"):

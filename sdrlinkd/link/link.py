@@ -8,7 +8,7 @@ import msgspec
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link.access import LEAST_PLAN, AccessParams
+from sdrlinkd.link.access import LEAST_ROOM, AccessParams
 from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos
@@ -205,11 +205,12 @@ class Link:
     def attach(self, traits: PduLinkTraits, access: AccessParams, rate: RateParams) -> Fit:
         """Fit the link to a radio that is up. Raises ConfigError and then changes nothing."""
         fit = fit_to(traits, access, rate, self.own_id, self._rng)
-        if fit.settled.policy == "grant" and self._composer.k_single < LEAST_PLAN:
+        missing = LEAST_ROOM - self._composer.k_single
+        if fit.settled.policy == "grant" and missing > 0:
+            size = self._clear_size
             raise ConfigError(
-                f"link.pdu_size: got PDUs with {self._composer.k_single} octets for records; "
-                f'allowed with access.policy = "grant": at least {LEAST_PLAN}, for a plan and a '
-                "request"
+                f'link.pdu_size: got {size}; allowed with access.policy = "grant": at least '
+                f"{size + missing}, so that a PDU holds a plan and a request"
             )
         self._team = frozenset(access.nodes)
         self.use(fit)
@@ -307,7 +308,8 @@ class Link:
                 self._receipts.unknowable(overrides.receipt, topic_id, dst)
         if refused is None:
             qos = overrides.qos if overrides.qos is not None else intake.treatment(topic_id)[0]
-            self._forecasts.note(Flow(self.own_id, self.own_id, topic_id), qos, now, len(payload))
+            flow, k = Flow(self.own_id, self.own_id, topic_id), self._composer.k_single
+            self._forecasts.note(flow, qos, now, max(1, -(-len(payload) // k)))
             self._scheduler.more_to_send()
             if depth := intake.policy(topic_id).latched:
                 kept = Kept(payload, now, overrides._replace(receipt=""))

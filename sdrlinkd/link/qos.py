@@ -24,6 +24,8 @@ CLASSES = {bits: qos for qos, bits in WIRE_BITS.items()}
 QOS_BY_LABEL = {qos.label: qos for qos in Qos}
 
 MAX_PRIORITY = 127
+MIDDLE_PRIORITY = 64
+"""The priority where none is set."""
 
 
 class Overrides(NamedTuple):

@@ -83,6 +83,8 @@ def _blocked_s(
     if supply.others:
         # Another robot may have begun a burst, too.
         blocked_s += min(setting.longest_s, max((t.most_s for t in lower), default=setting.one_s))
+    if task.qos > LEVEL and any(other.qos <= LEVEL for other in before):
+        blocked_s += supply.gives_way_s
     return blocked_s
 
 

@@ -19,7 +19,8 @@ class Supply(NamedTuple):
     its turn to its first possible sample. A turn then lasts `open_s`, and the next one starts
     `closed_s` after it. `pause_s` is the shortest pause before each burst, by class. `others` is
     the number of robots whose bursts come between ours. Each of our bursts waits for `passed_s`
-    while unused mini-slots pass.
+    while unused mini-slots pass. What is not urgent gives way for `gives_way_s` at most to urgent
+    messages that are expected.
     """
 
     gap_s: float
@@ -28,6 +29,7 @@ class Supply(NamedTuple):
     pause_s: tuple[float, ...] = (0.0,) * len(Qos)
     passed_s: float = 0.0
     others: int = 0
+    gives_way_s: float = 0.0
 
     @property
     def share(self) -> float:
@@ -62,7 +64,9 @@ def supply_of(
     if settled.policy == "grant":
         # With requests from everybody, a robot has its part of the budget in each round.
         open_s = max(pdu_s, access.share * access.round_s)
-        return Supply(access.round_s + decided_s + traits.react_s, open_s, access.round_s - open_s)
+        gap_s, closed_s = access.round_s + decided_s + traits.react_s, access.round_s - open_s
+        patience_s = 0.0 if access.by_request is None else access.by_request.patience_s
+        return Supply(gap_s, open_s, closed_s, gives_way_s=patience_s + access.round_s)
     if traits.tx_window_s < INFINITE:
         # A message that comes less than `follow` before the end of a TX window misses it.
         closed_s = traits.tx_window_follow_s + traits.rx_window_s

@@ -122,6 +122,11 @@ def test_what_carries_less_than_half_of_the_best_is_refused(policy):
 def test_the_best_and_half_of_it_are_taken():
     for wanted, traits in (("tdma", USRP), ("tdma", SOON), ("minislot", SOON), ("csma", SOON)):
         assert settled(params(wanted, [1, 2], force=False), traits).policy == wanted
+    slow = {"pdu_burst_s": (0.002,), "longest_burst_s": (0.05,)}
+    for traits in (USRP._replace(**slow), TX_WINDOWS._replace(**slow)):
+        for n in (2, 5, 8):
+            wanted = params("grant", [*range(1, n + 1)], force=False)
+            assert settled(wanted, traits, longest_s=0.05).policy == "grant"
     assert settled(params("none", [1, 2], force=False), USRP).policy == "none"
 
 
@@ -140,6 +145,15 @@ def test_a_link_refuses_it_at_attach_and_reports_what_it_came_to():
     assert (report.access_policy, round(report.access_share_pct)) == ("tdma", 97)
     assert report.access_reason.startswith("because this radio takes")
     assert settled.sentence == (f"tdma, {report.access_reason}; 97 % of the airtime is usable")
+
+
+def test_turns_by_request_need_room_for_a_plan():
+    wanted = params("grant", [1, 2])
+    with pytest.raises(ConfigError, match=r"link\.pdu_size: got 50; allowed .* at least 58"):
+        make_link(pdu_size=50).attach(USRP, wanted, RateParams())
+    with pytest.raises(ConfigError, match=r"got 57; allowed .* at least 58"):
+        make_link(pdu_size=57).attach(USRP, wanted, RateParams())
+    make_link(pdu_size=58).attach(USRP, wanted, RateParams())
 
 
 def test_minislots_wait_for_those_of_the_higher_level_and_say_so():
@@ -161,7 +175,7 @@ def test_robots_that_came_to_different_policies_are_told():
     slots, minislots = settled(auto([1, 2]), USRP).access, settled(auto([1, 2]), SOON).access
     assert notices_of(slots) == notices_of(minislots) == ""
     minislots.take_frame(2, Frame(2, 0, 0x1234, 0), 1.0)
-    assert "robot 2 keeps a tdma schedule" in notices_of(minislots)
+    assert "robot 2 keeps a schedule" in notices_of(minislots)
     for _ in range(3):
         assert notices_of(slots) == ""
         slots.beacon(2, 2.0)

@@ -1,5 +1,7 @@
 """`grant`: nobody clashes, everybody has a turn in time, and the team finds another root."""
 
+from collections import defaultdict
+from functools import cache
 from itertools import pairwise
 from random import Random
 
@@ -10,6 +12,8 @@ from hypothesis import strategies as st
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import Qos, Sensed
 from sdrlinkd.link.access import (
+    LEAST_ROOM,
+    Due,
     Ticks,
     Times,
     Waiting,
@@ -25,7 +29,7 @@ from sdrlinkd.link.access import (
 from sdrlinkd.wire import ANYBODY, Frame, Grant, Want, build_records
 from tests.laws import law
 from tests.link.radios import params
-from tests.link.turns import LONGEST_S, PDU_S, ROOM, TRAITS, Team
+from tests.link.turns import LONGEST_S, PDU_S, ROOM, STEP_S, TRAITS, Team
 
 FORMED_S = 3.0
 TIMES = Times(Ticks(1e-4, 2e-4), PDU_S, 0.02, LONGEST_S, 3e-4, 5e-4)
@@ -38,6 +42,14 @@ def saturated(n, seed, **more):
     for robot in team.robots.values():
         robot.bulk_s = 1e3
     return team
+
+
+@cache
+def schedule_of(nodes):
+    """What identifies the schedule of these robots, as their plans tell it."""
+    team = Team(list(nodes), 1)
+    team.run(FORMED_S)
+    return team.schedule
 
 
 def with_urgent(team, node, begin_s, end_s, per_s=10.0):
@@ -138,16 +150,15 @@ def test_two_teams_that_meet_become_one():
         team = saturated(4, seed, links=set(apart))
         team.run(FORMED_S)
         assert team.roots() == {1, 2}
-        team._links |= {(1, 2), (1, 4), (2, 3), (3, 4)}
+        team.links |= {(1, 2), (1, 4), (2, 3), (3, 4)}
         team.run(FORMED_S + 6)
         assert team.roots() == {1}
         assert team.clashes(FORMED_S + 5) == []
 
 
 def test_a_plan_that_cannot_be_meant_is_refused():
-    team = Team([1, 2], 1)
-    access = team.robots[2].access
-    good = Frame(1, 0, access._schedule, 0)
+    access = Team([1, 2], 1).robots[2].access
+    good = Frame(1, 0, schedule_of((1, 2)), 0)
     for frame, grant in [
         (good, Grant(1, 1, 10**9, ((2, 10),))),
         (good, Grant(1, 1, 1000, ((2, 10), (255, 0), (2, 5)))),
@@ -168,9 +179,9 @@ def test_a_plan_that_cannot_be_meant_is_refused():
 
 
 def test_who_keeps_other_times_is_told_of():
-    access = Team([1, 2], 1).robots[2].access
-    access.take_frame(1, Frame(1, 0, access._schedule ^ 1, 0), 5.0)
-    access.take_frame(9, Frame(9, 0, access._schedule, 0), 5.0)
+    access, ours = Team([1, 2], 1).robots[2].access, schedule_of((1, 2))
+    access.take_frame(1, Frame(1, 0, ours ^ 1, 0), 5.0)
+    access.take_frame(9, Frame(9, 0, ours, 0), 5.0)
     notices = access.notices(6.0)
     assert len(notices) == 2
     assert "robot 9" in notices[0]
@@ -276,16 +287,45 @@ def test_a_request_survives_the_air(waiting):
     told = waiting_of(want_of(3, waiting))
     assert (told.qos, told.priority) == (waiting.qos, waiting.priority)
     assert waiting.air_s <= told.air_s * (1 + 1e-9) <= max(6e-5, 1.1 * waiting.air_s)
-    assert waiting_of(want_of(3, None)) is None
+    assert waiting_of(want_of(3, waiting)._replace(air=0, lower_air=0)) is None
 
 
-def test_a_plan_never_has_more_turns_than_a_pdu_has_room_for():
-    team = saturated(12, 3)
-    team.run(1.0)
+@pytest.mark.parametrize("links", [None, {(1, node) for node in range(2, 13)} | {(2, 13)}])
+def test_a_plan_fits_into_the_room_that_each_pdu_has(links):
+    """Also when all want the most, and expect something urgent at once."""
+    team = saturated(13, 3, links=links)
+    team.run(FORMED_S)
+    team.tell_links()
+    team.run(FORMED_S + 1)
     robot = team.robots[1]
-    for room in (ROOM, 40, 30, 18, 5):
-        (_, grant) = robot.access.told(robot.clock(team.t), PDU_S, room)
-        assert 10 + 8 + 2 * len(grant.turns) <= max(room, 18)
+    now, spare = robot.clock(team.t), len(build_records([want_of(1, Waiting(Qos.BULK, 0, 1, 1))]))
+    dues = tuple(Due(node, Qos.URGENT, now + 0.01, PDU_S) for node in range(2, 14))
+    wish = Wish(now, Qos.BULK, PDU_S, Sensed(now, now), robot.waiting(team.t), dues)
+    while robot.access.slot(wish) is None:
+        now += 1e-3
+        wish = wish._replace(earliest=now, sensed=Sensed(now, now))
+    told = robot.access.told(now, PDU_S, LEAST_ROOM)
+    assert len(told[1].turns) > 8
+    assert len(build_records(told)) + spare <= LEAST_ROOM
+
+
+def test_requests_that_do_not_fit_beside_a_plan_wait_for_the_next_pdu():
+    nodes, far = [*range(1, 10)], [*range(3, 10)]
+    relay = make_access(params("grant", nodes), 2, TRAITS, LONGEST_S, Random(1))
+    relay.know_links({1: {2: 1.0}, 2: dict.fromkeys([1, *far], 1.0)})
+    relay.take_frame(1, Frame(1, 0, schedule_of(tuple(nodes)), 0), 5.0)
+    relay.take_grant(1, Grant(1, 2, 1000, tuple((node, 10) for node in [2, *far])), 5.0)
+    wants = [want_of(node, Waiting(Qos.BULK, 0, 0.0, 0.1)) for node in far]
+    for want in wants:
+        relay.take_want(want, 5.0)
+    told = []
+    while relay.must_tell:
+        records = relay.told(5.001, PDU_S, LEAST_ROOM)
+        assert len(build_records(records)) <= LEAST_ROOM
+        told.append(records)
+    assert isinstance(told[0][1], Grant)
+    assert len(told) > 1
+    assert [each for records in told for each in records if isinstance(each, Want)] == wants
 
 
 @pytest.mark.parametrize("links", [None, CHAIN])
@@ -320,6 +360,39 @@ def test_where_a_burst_has_a_single_pdu_the_root_sends_too():
     assert min(air_s.values()) > 0.2 * 2
 
 
+@pytest.mark.parametrize("every_s", [0.001, 0.003, 0.01, 0.05])
+@pytest.mark.parametrize("node", [1, 2])
+@pytest.mark.parametrize("has_bulk", [False, True])
+def test_what_is_expected_starves_nobody(node, every_s, has_bulk):
+    """Robot 3 may have bulk, robots 2 and 4 are quiet, and robot 5 may come at any time."""
+    root = make_access(params("grant", [1, 2, 3, 4, 5]), 1, TRAITS, LONGEST_S, Random(1))
+    now, turns_at, air_s = 0.0, defaultdict(list), 0.0
+    while now < 6.0:
+        for other in (2, 3, 4):
+            root.heard(other, now, False)
+        if has_bulk:
+            root.take_want(want_of(3, Waiting(Qos.BULK, 0, 1.0, 1.0)), now)
+        next_at = every_s * (1 + now // every_s)
+        dues = tuple(
+            Due(node, Qos.URGENT, next_at + n * every_s, PDU_S) for n in range(int(0.1 / every_s))
+        )
+        slot = root.slot(Wish(now, Qos.DEFAULT, PDU_S, Sensed(now, 0.0), None, dues))
+        if slot is None:
+            now += STEP_S
+            continue
+        _, grant = root.told(slot.start, PDU_S, LEAST_ROOM)
+        root.sent(slot.start + PDU_S, None)
+        begin = slot.start + 1e-6 * grant.begins_us
+        for turn in TIMES.ticks.round(grant.number, begin, grant.turns).turns:
+            turns_at[turn.node].append(turn.begin)
+            air_s += (turn.end - turn.begin) * (turn.node == 3)
+        now = max(now + STEP_S, root.turn_at(now))
+    assert air_s > 0.3 * now * has_bulk
+    for other in (2, 3, 4, ANYBODY):
+        longest_s = max(b - a for a, b in pairwise([0.5, *turns_at[other], now]) if b > 0.5)
+        assert longest_s <= 2 * root.round_s + 0.25 * (other == ANYBODY)
+
+
 octet = st.integers(0, 255)
 told = st.one_of(
     st.tuples(st.just("frame"), octet, octet, octet, st.booleans(), st.integers(0, 10**6)),
@@ -347,7 +420,7 @@ def test_whatever_is_told_turns_stay_within_bounds(events, own_id):
         src = fields[0] % 4
         if kind == "frame":
             _, root, level, is_ours, phase_us = fields
-            schedule = access._schedule if is_ours else 1
+            schedule = schedule_of((1, 2, 3)) if is_ours else 1
             access.take_frame(src, Frame(root % 4, level, schedule, phase_us), now)
         elif kind == "grant":
             _, number, reach, begins_us, turns = fields
@@ -365,7 +438,7 @@ def test_whatever_is_told_turns_stay_within_bounds(events, own_id):
         if slot is not None:
             assert now <= slot.start <= slot.end <= slot.start + 2 * access.round_s
             records = access.told(slot.start, PDU_S, ROOM)
-            assert len(build_records(records)) <= ROOM + 7 * 3
+            assert len(build_records(records)) <= ROOM
             access.sent(slot.start + PDU_S, None)
     assert access.state
     assert all(isinstance(each, str) for each in access.notices(now))

@@ -44,7 +44,8 @@ class Doorkeeper:
     state = "kept"
     pause_s = 0.0
     others_follow = False
-    keeps_schedule = takes_requests = False
+    keeps_schedule = False
+    by_request = None
 
     def slot(self, wish):
         return self.slots.pop(0)
@@ -57,9 +58,6 @@ class Doorkeeper:
 
     def frame(self, start):
         return None
-
-    def know_links(self, edges):
-        pass
 
 
 def test_it_goes_again_as_it_was_but_older():

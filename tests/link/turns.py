@@ -64,15 +64,17 @@ class Team:
             )
             for node in nodes
         }
-        self._links, self._loss = links, loss
+        self.links, self._loss = links, loss
         self.traits = traits
         self.bursts = []
         self.waits_s = []
         """Waits of urgent messages, as (robot, when it came, wait in s)."""
+        self.schedule = None
+        """What identifies the schedule, once a plan was told."""
         self.t = 0.0
 
     def hears(self, one, other):
-        return self._links is None or (one, other) in self._links or (other, one) in self._links
+        return self.links is None or (one, other) in self.links or (other, one) in self.links
 
     def roots(self):
         return {each.id for each in self.robots.values() if each.is_on and each.access.plans}
@@ -80,7 +82,7 @@ class Team:
     def tell_links(self):
         """Let all robots know all links, as LSAs do."""
         edges = {node: {} for node in self.robots}
-        for one, other in self._links or ():
+        for one, other in self.links or ():
             edges[one][other] = edges[other][one] = 1.0
         for robot in self.robots.values():
             robot.access.know_links(edges)
@@ -131,6 +133,9 @@ class Team:
             n_data += 1
         length_s = max(1, n_told + n_data) * PDU_S
         records = access.told(slot.start, length_s, ROOM) if has_plan else []
+        for record in records:
+            if type(record).__name__ == "Frame":
+                self.schedule = record.schedule
         if want is not None:
             records.append(want)
             access.requested(want, slot.start)

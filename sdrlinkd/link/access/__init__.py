@@ -6,6 +6,7 @@ that fits the radio. It never reads a message, and decides only when to send.
 
 from sdrlinkd.link.access.auto import Settled, may_share, percent, settle
 from sdrlinkd.link.access.base import Access, Slot, Wish
+from sdrlinkd.link.access.by_request import ByRequest
 from sdrlinkd.link.access.choice import (
     CLOCK_ERROR_S,
     LONGEST_APART_S,
@@ -18,7 +19,7 @@ from sdrlinkd.link.access.csma import STEPS as CSMA_STEPS
 from sdrlinkd.link.access.csma import WINDOWS as CSMA_WINDOWS
 from sdrlinkd.link.access.csma import Csma
 from sdrlinkd.link.access.free import Free
-from sdrlinkd.link.access.grant import LEAST_PLAN, Grants
+from sdrlinkd.link.access.grant import LEAST_ROOM, Grants
 from sdrlinkd.link.access.idle import idle_words
 from sdrlinkd.link.access.minislot import LEVELS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
@@ -28,14 +29,15 @@ from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S, Tdma
 from sdrlinkd.link.access.tdma_states import STEPS as TDMA_STEPS
 from sdrlinkd.link.access.team import places_of
-from sdrlinkd.link.access.turns import Ticks
+from sdrlinkd.link.access.turns import ALMOST_S, Ticks
 
 __all__ = [
+    "ALMOST_S",
     "CLOCK_ERROR_S",
     "CSMA_STEPS",
     "CSMA_WINDOWS",
     "FORGET_S",
-    "LEAST_PLAN",
+    "LEAST_ROOM",
     "LEVELS",
     "LISTEN_S",
     "LONGEST_APART_S",
@@ -44,6 +46,7 @@ __all__ = [
     "TDMA_STEPS",
     "Access",
     "AccessParams",
+    "ByRequest",
     "Csma",
     "Due",
     "Free",

@@ -4,12 +4,12 @@ import math
 from math import inf
 from typing import NamedTuple, Protocol, Self
 
+from sdrlinkd.link.access.by_request import ByRequest
 from sdrlinkd.link.access.requests import Due, Waiting
 from sdrlinkd.link.access.sightings import Sightings
-from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.traits import Sensed
-from sdrlinkd.wire import Frame, Grant, Record, Want
+from sdrlinkd.wire import Frame
 
 NEVER = -1.0
 MOST_ON_THEIR_WAY = 8
@@ -36,8 +36,8 @@ class Slot(NamedTuple):
 class Wish(NamedTuple):
     """A request to send a burst of class `qos`, at least `need_s` long, at `earliest` or later.
 
-    `waiting` is all that waits, for policies that take requests, and `dues` are the next messages
-    that the team expects, for robots that plan.
+    Where turns are given by request, `waiting` is all that waits, and `dues` are the next messages
+    that the team expects, for the robot that plans.
     """
 
     earliest: float
@@ -85,24 +85,8 @@ class Access(Protocol):
         """Whether the policy announces a schedule to other robots."""
 
     @property
-    def takes_requests(self) -> bool:
-        """Whether robots tell each other what waits, and who gets the air for it."""
-
-    @property
-    def plans(self) -> bool:
-        """Whether this robot plans turns for the team now."""
-
-    @property
-    def is_far(self) -> bool:
-        """Whether the robot that plans does not hear us."""
-
-    @property
-    def ahead_s(self) -> float:
-        """How far ahead, in s, requests cover what will wait."""
-
-    @property
-    def tells_at(self) -> float:
-        """Time in s from which the policy itself has something to tell; infinity: nothing."""
+    def by_request(self) -> ByRequest | None:
+        """The policy itself, if it gives turns by request."""
 
     def mean_wait_s(self, qos: Qos) -> float:
         """Mean time in s from an idle channel to a burst of class `qos`."""
@@ -114,22 +98,6 @@ class Access(Protocol):
 
     def slot(self, wish: Wish) -> Slot | None:
         """The slot in which the requested burst may leave; None: not now."""
-
-    def turn_at(self, earliest: float) -> float:
-        """When we may send next, at `earliest` or later, as far as known; infinity: unknown."""
-
-    @property
-    def must_tell(self) -> bool:
-        """Whether our next burst must tell something."""
-
-    def request(self, start: float, left: Waiting | None) -> Want | None:
-        """What a burst at `start` should ask for, after which `left` waits; None: nothing."""
-
-    def requested(self, want: Want, start: float) -> None:
-        """Note that a burst at `start` asks for something."""
-
-    def told(self, start: float, length_s: float, room: int) -> list[Record]:
-        """What a burst of `length_s` at `start` must tell, in a PDU with `room` octets for it."""
 
     def sent(self, end: float, src: int | None) -> None:
         """Note that our burst will be on the air until `end`.
@@ -155,15 +123,6 @@ class Access(Protocol):
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """Take the schedule that robot `src` announced in a burst whose preamble was at `at`."""
 
-    def take_want(self, want: Want, at: float) -> None:
-        """Take what a robot wants to send, as told directly in a burst at `at`."""
-
-    def take_grant(self, src: int, grant: Grant, at: float) -> None:
-        """Take the turns that robot `src` told, after a FRAME, in a burst at `at`."""
-
-    def know_links(self, edges: Edges) -> None:
-        """Take the links of the team."""
-
     def notices(self, now: float) -> list[str]:
         """What a person should know about the sharing of the channel, in sentences."""
 
@@ -180,24 +139,17 @@ class BusyChannel:
     step_s = 0.0
     others_follow = False
     keeps_schedule = False
-    takes_requests = False
-    ahead_s = 0.0
 
     @property
-    def plans(self) -> bool:
-        """No, as no turns are planned."""
-        return False
-
-    @property
-    def is_far(self) -> bool:
-        """No, as nobody plans."""
-        return False
+    def by_request(self) -> ByRequest | None:
+        """None, as nobody asks for turns."""
+        return None
 
     def __init__(self) -> None:
         self._own_ends = [NEVER]
         """Ends of our last bursts, ascending; some may not have left yet."""
         self._scheduled = Sightings()
-        """Robots that announce a tdma schedule."""
+        """Robots that announce a schedule."""
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # not all ask for it
         """Mean time in s from an idle channel to a burst of class `qos`: 0."""
@@ -232,44 +184,10 @@ class BusyChannel:
         """Remember that robot `src` keeps a schedule and so uses another policy."""
         self._scheduled.add(src, at)
 
-    @property
-    def tells_at(self) -> float:
-        """Never, as no schedule is planned."""
-        return math.inf
-
-    def turn_at(self, earliest: float) -> float:
-        """At once, as far as known."""
-        return earliest
-
-    @property
-    def must_tell(self) -> bool:
-        """No, as nobody plans."""
-        return False
-
-    def request(self, start: float, left: Waiting | None) -> Want | None:  # noqa: ARG002
-        """What to ask for: nothing, as nobody plans."""
-        return None
-
-    def requested(self, want: Want, start: float) -> None:
-        """Ignore what we ask for, as nobody plans."""
-
-    def told(self, start: float, length_s: float, room: int) -> list[Record]:  # noqa: ARG002
-        """What to tell: nothing, as nobody plans."""
-        return []
-
-    def take_want(self, want: Want, at: float) -> None:
-        """Ignore what a robot wants to send, as nobody is asked."""
-
-    def take_grant(self, src: int, grant: Grant, at: float) -> None:
-        """Ignore turns, as no schedule is kept."""
-
-    def know_links(self, edges: Edges) -> None:
-        """Ignore the links of the team, as no turn depends on them."""
-
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that use another access policy."""
         return [
-            f"robot {src} keeps a tdma schedule and this robot does not: their bursts collide; "
+            f"robot {src} keeps a schedule and this robot does not: their bursts collide; "
             "give both the same [access], and radios of one kind where access.policy is auto"
             for src in self._scheduled.lately(now)
         ]

@@ -161,7 +161,9 @@ def _make_grant(
     hears_s = max(guard_s, min(traits.lead_s + look_s, HEARS_SHARE * budget_s))
     longest_s = longest_burst_s + traits.overhead_s
     times = Times(ticks, turn_s, budget_s, longest_s, hears_s, react_s)
-    return Grants(own_id, params.nodes, times, rng, lead_s=traits.lead_s, look_s=look_s)
+    return Grants(
+        own_id, params.nodes, times, rng, lead_s=traits.lead_s, look_s=look_s, gap_s=traits.gap_s
+    )
 
 
 def _refuse_deaf(params: AccessParams, traits: PduLinkTraits) -> None:

@@ -104,7 +104,7 @@ class Csma(BusyChannel):
 
     def slot(self, wish: Wish) -> Slot | None:
         """The drawn slot, once all slots before it were sensed idle."""
-        earliest, qos, _, sensed = wish[:4]
+        earliest, qos, sensed = wish.earliest, wish.qos, wish.sensed
         idle_since = self.idle_since(sensed)
         if idle_since is None:
             return None

@@ -5,23 +5,23 @@ then all others send in theirs. A robot sends only in turns of a plan that it ha
 plan costs turns and never a collision.
 """
 
-import math
 from collections.abc import Sequence
 from math import inf
 from random import Random
 from struct import pack
 
 from sdrlinkd.link.access.base import BusyChannel, Slot, Wish
+from sdrlinkd.link.access.by_request import ByRequest
 from sdrlinkd.link.access.known_rounds import KnownRounds
 from sdrlinkd.link.access.leadership import Leadership
 from sdrlinkd.link.access.own_request import OwnRequest
-from sdrlinkd.link.access.planner import Planner
+from sdrlinkd.link.access.planner import PATIENCE_S, Planner
 from sdrlinkd.link.access.requests import Waiting
-from sdrlinkd.link.access.round_plan import Times
+from sdrlinkd.link.access.round_plan import MOST_TOLD, Times
 from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.access.tdma_states import Happens
 from sdrlinkd.link.access.team import Team
-from sdrlinkd.link.access.turns import Turn
+from sdrlinkd.link.access.turns import ALMOST_S, Turn
 from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import (
@@ -38,12 +38,9 @@ from sdrlinkd.wire import (
 from sdrlinkd.wire import Grant as GrantRecord
 from sdrlinkd.wire import Want as WantRecord
 
-ALMOST_S = 1e-9
-"""Rounding of times, in s."""
-
-
-LEAST_PLAN = FRAME_SIZE + GRANT_OVERHEAD + 4 * TURN_SIZE + WANT_SIZE
-"""Octets for records that a PDU must have: for a plan with four turns, and a request."""
+PLAN_SIZE = FRAME_SIZE + GRANT_OVERHEAD + MOST_TOLD * TURN_SIZE
+LEAST_ROOM = PLAN_SIZE + WANT_SIZE
+"""Octets for records that a PDU must have: for a plan and a request."""
 
 
 class Grants(BusyChannel):
@@ -53,11 +50,13 @@ class Grants(BusyChannel):
     most urgent messages a longer one. Robots that hear the root tell its plan to those that do not.
     """
 
-    takes_requests = True
+    patience_s = PATIENCE_S
+    ahead_s = 0.0
+    """How long the last round took: what we ask for now is given after one."""
 
     def __init__(
         self, own_id: int, nodes: Sequence[int], times: Times, rng: Random, *, lead_s: float,
-        look_s: float,
+        look_s: float, gap_s: float,
     ) -> None:  # fmt: skip
         super().__init__()
         self._own_id = own_id
@@ -65,6 +64,7 @@ class Grants(BusyChannel):
         self._rng = rng
         self._lead_s = lead_s
         self._look_s = look_s
+        self._gap_s = gap_s
         self.round_s = times.round_s(len(nodes))
         self.share = times.budget_s / len(nodes) / self.round_s
         micro = [round(1e6 * each) for each in (*times.ticks, times.turn_s, times.budget_s)]
@@ -104,10 +104,13 @@ class Grants(BusyChannel):
         return self.round_s / 2
 
     def carries(self, burst_s: float) -> float:
-        """Share of airtime beyond the least turns, less the gaps and guards of bursts."""
-        times = self._times
-        guard_s = times.ticks.guard_s * math.ceil(times.budget_s / burst_s)
-        return max(0.0, times.budget_s - guard_s) / self.round_s
+        """Share of airtime of requested turns, less the gaps between bursts."""
+        return self._times.carries(len(self._team.nodes)) * burst_s / (burst_s + self._gap_s)
+
+    @property
+    def by_request(self) -> ByRequest:
+        """This policy."""
+        return self
 
     @property
     def plans(self) -> bool:
@@ -183,11 +186,10 @@ class Grants(BusyChannel):
         """The plan of the next round, or the one that we pass on, with requests to pass on."""
         leads = self._leads
         if leads.is_root:
-            most = max(0, room - FRAME_SIZE - GRANT_OVERHEAD) // TURN_SIZE
             leads.look(start)
             # Until its end, the round of a root that we have taken over from goes on.
             last = self._rounds.last
-            grant, made = self._planner.plan(start, length_s, leads.rank[0], most, last)
+            grant, made = self._planner.plan(start, length_s, leads.rank[0], last)
             self._rounds.made(made)
             return [Frame(self._own_id, 0, self._schedule, 0), grant]
         records: list[Record] = []
@@ -195,8 +197,9 @@ class Grants(BusyChannel):
         if plan is not None:
             phase_us = max(0, round(1e6 * (start - plan[0])))
             records += [Frame(leads.root, leads.level, self._schedule, phase_us), plan[1]]
-        records += self._behind.values()
-        self._behind.clear()
+            room -= PLAN_SIZE
+        for node in [*self._behind][: room // WANT_SIZE]:
+            records.append(self._behind.pop(node))
         return records
 
     def sent(self, end: float, src: int | None) -> None:

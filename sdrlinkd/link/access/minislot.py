@@ -101,7 +101,7 @@ class MiniSlots(BusyChannel):
 
     def slot(self, wish: Wish) -> Slot | None:
         """Our next mini-slot, once all mini-slots before it were sensed idle."""
-        earliest, qos, _, sensed = wish[:4]
+        earliest, qos, sensed = wish.earliest, wish.qos, wish.sensed
         idle_since = self.idle_since(sensed)
         if idle_since is None:
             return None

@@ -1,22 +1,23 @@
 """What the root knows and does: it takes requests, and plans one round after the other."""
 
 import math
+from collections.abc import Mapping
 from math import inf
 
 from sdrlinkd.link.access.base import Slot, Wish
 from sdrlinkd.link.access.requests import Due, Requests, Waiting
-from sdrlinkd.link.access.round_plan import Times, before, plan, shares
+from sdrlinkd.link.access.round_plan import MOST_TOLD, Times, before, plan, shares
 from sdrlinkd.link.access.team import Team
-from sdrlinkd.link.access.turns import Round
+from sdrlinkd.link.access.turns import ALMOST_S, Round
 from sdrlinkd.link.qos import Qos
-from sdrlinkd.wire import Grant, Want
+from sdrlinkd.wire import ANYBODY, Grant, Want
 
 OPEN_S = 0.25
 """Longest time in s between two turns for robots that are not here yet."""
+PATIENCE_S = 0.5
+"""Time in s for which what waits somewhere gives way to all that is expected."""
 LATELY_S = 1.0
 """Time in s in which airtime that was given is forgotten to 37 %."""
-ALMOST_S = 1e-9
-"""Rounding of times, in s."""
 NUMBERS = 256
 """Count of the numbers of rounds, which wrap around."""
 
@@ -34,9 +35,10 @@ class Planner:
         self._had_s: dict[int, float] = {}
         """Airtime in s for what is not urgent that each robot was given lately."""
         self._number = 0
+        self._own_since = inf
+        """Since when we have something to send; infinity: nothing."""
         self._dues: tuple[Due, ...] = ()
         """The next urgent messages that the team expects."""
-        self._opened_at = -inf
         self._made_at = -inf
         self.turn_at = 0.0
         """When our next turn begins."""
@@ -70,7 +72,7 @@ class Planner:
         """When the next plan is due, though we have nothing to send."""
         if self._team.present(self.turn_at):
             return self.turn_at
-        return max(self.turn_at, self._opened_at + OPEN_S)
+        return max(self.turn_at, self._served_at.get(ANYBODY, -inf) + OPEN_S)
 
     def slot(self, wish: Wish) -> Slot:
         """The next burst of our turn, which is as long as what waits here deserves.
@@ -79,6 +81,7 @@ class Planner:
         """
         times, start = self._times, max(self.turn_at, wish.earliest)
         self._dues = wish.dues
+        self._own_since = min(self._own_since, start) if wish.waiting else inf
         end = self._turn_end
         if wish.waiting is None:
             end = start + times.turn_s
@@ -94,9 +97,9 @@ class Planner:
         return Slot(start, until, until)
 
     def plan(
-        self, start: float, length_s: float, reach: int, most: int, last: Round | None
+        self, start: float, length_s: float, reach: int, last: Round | None
     ) -> tuple[Grant, Round]:
-        """Plan the round after a burst of ours of `length_s` at `start`, with `most` turns at most.
+        """Plan the round after a burst of ours of `length_s` at `start`.
 
         `last` is the round of the root that we have taken over from.
         """
@@ -109,38 +112,73 @@ class Planner:
         self._had_s = {node: kept * had_s for node, had_s in self._had_s.items()}
         self._had_s[self._own_id] = self._had_s.get(self._own_id, 0.0) + used_s
         given = shares(times._replace(budget_s=rest_s), wanted, self._had_s)
-        for node, given_s in given.items():
-            self._note_had(node, wanted[node], given_s)
-        is_absent = len(present) + 1 < len(team.nodes)
-        is_open = is_absent and (not wanted or start >= self._opened_at + OPEN_S)
         after_s = max(length_s + times.ticks.guard_s, times.turn_s + times.react_s)
         if last is not None:
             after_s = max(after_s, last.end - start)
         begins_us = math.ceil(1e6 * after_s)
         begin = start + 1e-6 * begins_us
+        is_absent = len(present) + 1 < len(team.nodes)
         turns = plan(
             times, begin, present, given, wanted, team.places(self._own_id), self._served_at,
-            is_open=is_open,
+            is_open=is_absent and (not wanted or self._is_overdue(ANYBODY, begin)),
         )  # fmt: skip
-        if self._dues:
-            turns = before(self._dues, self._own_id, times.ticks, begin, turns, times.turn_s)
-        turns = turns[:most]
+        dues = self._heeded(begin)
+        if dues:
+            keep = self._kept(begin, dues[0].qos, given, wanted)
+            turns = before(dues, self._own_id, times.ticks, begin, turns, times.turn_s, keep)
+            turns = turns[:MOST_TOLD]
         self._number = (self._number + 1) % NUMBERS
         made = times.ticks.round(self._number, begin, turns)
         for turn in made.turns:
             self._served_at[turn.node] = turn.begin
             self._requests.given(turn.node, turn.end - turn.begin)
-        if is_open:
-            self._opened_at = start
+            if turn.node in given:
+                longer_s = turn.end - turn.begin - times.turn_s
+                self._note_had(turn.node, wanted[turn.node], longer_s)
         # What comes in the last turn can go on in ours.
         self.turn_at = made.end - times.ticks.guard_s + times.hears_s
         self._turn_end = -inf
         self._made_at = start
         return Grant(self._number, reach, begins_us, tuple(turns)), made
 
+    def _kept(
+        self, begin: float, qos: Qos, given: Mapping[int, float], wanted: Mapping[int, Waiting]
+    ) -> dict[int, int]:
+        """The ticks that robots keep in a round from `begin` on, if class `qos` is expected.
+
+        What waits comes before what is expected in the same class, and nobody waits long for a
+        least turn.
+        """
+        times, kept = self._times, dict[int, int]()
+        for node in (*self._team.present(begin), ANYBODY):
+            waiting = wanted.get(node)
+            if waiting is not None and waiting.qos <= qos:
+                given_s = min(given.get(node, 0.0), waiting.air_s)
+                kept[node] = times.ticks.count(times.turn_s + given_s)
+            elif self._is_overdue(node, begin):
+                kept[node] = times.ticks.count(times.turn_s)
+        return kept
+
+    def _heeded(self, begin: float) -> tuple[Due, ...]:
+        """The expected messages that may end a round from `begin` on.
+
+        Rounds that end for each of many would leave no air for what waits. If that waits for long,
+        rounds end only where they are worth their least turns.
+        """
+        since = min(self._own_since, self._requests.since)
+        if begin < since + PATIENCE_S:
+            return self._dues
+        least_s = self._times.least_s(len(self._team.nodes))
+        return tuple(due for due in self._dues if due.at >= begin + least_s)
+
+    def _is_overdue(self, node: int, begin: float) -> bool:
+        """Whether a robot has had no turn for a long time, in a round from `begin` on."""
+        most_s = OPEN_S if node == ANYBODY else self._times.round_s(len(self._team.nodes))
+        return self._served_at.get(node, -inf) < begin - most_s
+
     def _length_s(self, waiting: Waiting, start: float) -> float:
         """The length in s of our turn at `start`, with a PDU for the plan."""
-        times, dues = self._times, self._dues
+        times, dues = self._times, self._heeded(start)
         wanted = {**self._wanted(start), self._own_id: waiting}
         given_s = shares(times, wanted, self._had_s).get(self._own_id, 0.0)
         length_s = 2 * times.turn_s + given_s

@@ -1,6 +1,7 @@
 """What the robots of the team would send next, and the order in which they get the air."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
@@ -18,6 +19,7 @@ class Due(NamedTuple):
     """An urgent message of robot `node`, which will probably be there at `at`, in s."""
 
     node: int
+    qos: Qos
     at: float
     air_s: float
     """Airtime of the message."""
@@ -62,10 +64,8 @@ def together(one: Waiting | None, other: Waiting | None) -> Waiting | None:
     return first._replace(lower_air_s=first.lower_air_s + second.all_s)
 
 
-def want_of(node: int, waiting: Waiting | None) -> Want:
+def want_of(node: int, waiting: Waiting) -> Want:
     """The WANT record for what waits at robot `node`."""
-    if waiting is None:
-        return Want(node, Qos.BULK, 0, 0, 0, 0)
     return Want(
         node,
         waiting.qos,
@@ -87,6 +87,8 @@ def waiting_of(want: Want) -> Waiting | None:
 class _Request:
     waiting: Waiting
     at: float
+    since: float
+    """When the robot began to ask."""
 
 
 class Requests:
@@ -101,7 +103,9 @@ class Requests:
         if waiting is None:
             self._by_node.pop(want.node, None)
         else:
-            self._by_node[want.node] = _Request(waiting, at)
+            known = self._by_node.get(want.node)
+            since = at if known is None else known.since
+            self._by_node[want.node] = _Request(waiting, at, since)
 
     def given(self, node: int, length_s: float) -> None:
         """Note that a robot was given a turn of this length."""
@@ -113,9 +117,10 @@ class Requests:
             else:
                 request.waiting = left
 
-    def forget(self, node: int) -> None:
-        """Forget the request of a robot that is gone."""
-        self._by_node.pop(node, None)
+    @property
+    def since(self) -> float:
+        """Since when the robot that has waited longest wants something; infinity: nobody does."""
+        return min((request.since for request in self._by_node.values()), default=inf)
 
     def of(self, node: int, now: float) -> Waiting | None:
         """What waits at a robot, as far as known, with its age at `now`."""

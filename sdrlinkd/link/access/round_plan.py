@@ -13,15 +13,15 @@ from typing import NamedTuple
 from sdrlinkd.link.access.requests import Due, Waiting, rank
 from sdrlinkd.link.access.team import Places
 from sdrlinkd.link.access.turns import Ticks
-from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.qos import MIDDLE_PRIORITY, Qos
 from sdrlinkd.wire import ANYBODY, MAX_AIR
 
 MOST_TURNS = 8
 """Most robots with a turn in one round, beside the root."""
 SPARE_TURNS = 2
 """Turns of a round beyond one for each robot: for those who are not here, and a second one."""
-MIDDLE = 64
-"""The priority of messages of which no request tells it."""
+MOST_TOLD = MOST_TURNS + SPARE_TURNS
+"""Most turns in a plan."""
 STANDS = 0.5
 """Share of a round's budget that passes between two turns of a robot that does not want any."""
 
@@ -48,12 +48,21 @@ class Times(NamedTuple):
         turns_s = (others + SPARE_TURNS) * least_s + (2 + others) * self.turn_s
         return turns_s + self.budget_s + self.react_s + self.hears_s
 
+    def carries(self, n: int) -> float:
+        """Share of the budget in a round of `n` robots that all want more than they get."""
+        return self.budget_s / (self.budget_s + self.least_s(n))
+
+    def least_s(self, n: int) -> float:
+        """A round of `n` robots that have only their least turns."""
+        others = min(n - 1, MOST_TURNS)
+        turns_s = others * (self.turn_s + self.ticks.guard_s) + 2 * self.turn_s
+        return turns_s + self.react_s + self.hears_s
+
 
 def shares(
     times: Times,
     waiting: Mapping[int, Waiting],
     had_s: Mapping[int, float],
-    most: int = MOST_TURNS + 1,
 ) -> dict[int, float]:
     """The airtime in s that each robot gets beyond its least turn, of those that want more.
 
@@ -66,11 +75,11 @@ def shares(
         is_urgent = each.qos <= Qos.LATENCY
         since = -each.age_s if is_urgent else had_s.get(node, 0.0)
         parts.append((each.qos, -each.priority, since, node, each.air_s))
-        parts.append((Qos.BULK, -MIDDLE, had_s.get(node, 0.0), node, each.lower_air_s))
+        parts.append((Qos.BULK, -MIDDLE_PRIORITY, had_s.get(node, 0.0), node, each.lower_air_s))
     left_s, given = times.budget_s, dict[int, float]()
     for *_, node, part_s in sorted(parts):
         given_s = min(part_s, left_s)
-        if given_s > 0 and (node in given or len(given) < most):
+        if given_s > 0 and (node in given or len(given) <= MOST_TURNS):
             given[node] = given.get(node, 0.0) + given_s
             left_s -= given_s
     return given
@@ -138,12 +147,14 @@ def before(
     begin: float,
     turns: list[tuple[int, int]],
     turn_s: float,
+    kept: Mapping[int, int],
 ) -> list[tuple[int, int]]:
     """The turns of a round from `begin` on, changed so that messages find turns when they are due.
 
     `dues` are in order of time. The robot that the first one comes from gets the last turn, so that
-    the root can forward it at once; so do those of messages that are due together with it. Turns
-    longer than `turn_s` end before; if the first one comes too soon for that, there are no others.
+    the root can forward it at once; so do those of messages that are due together with it. Other
+    turns end before: they become as short as `turn_s`, or are left out if the first message comes
+    too soon for that. But robots in `kept` keep so many ticks.
     If the round is over long before, it stays as it is.
     """
     first, least = dues[0], ticks.count(turn_s)
@@ -155,12 +166,13 @@ def before(
     if end_of(rest) < first.at - 2 * turn_s:
         return turns
     if first.at < begin + 2 * turn_s:
-        rest = []
+        rest = [turn for turn in rest if turn[0] in kept]
     for i in range(len(rest) - 1, -1, -1):
         node, length = rest[i]
         over_s = end_of(rest) - first.at
         if over_s > 0 and length > least:
-            rest[i] = node, max(least, length - ticks.count(over_s))
+            shortest = min(length, max(least, kept.get(node, 0)))
+            rest[i] = node, max(shortest, length - ticks.count(over_s))
     for due in dues:
         at = end_of(rest)
         if due.at > at + 2 * turn_s and due is not first:

@@ -119,7 +119,7 @@ class Tdma(BusyChannel):
 
     def slot(self, wish: Wish) -> Slot | None:
         """A time in our own slot, or in one that its owner does not use."""
-        earliest, _, need_s, sensed = wish[:4]
+        earliest, need_s, sensed = wish.earliest, wish.need_s, wish.sensed
         if self.role is State.LISTENING:
             if earliest < self._begins_at and not self._is_first(earliest, sensed):
                 return None

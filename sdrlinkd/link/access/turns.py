@@ -6,6 +6,9 @@ from typing import NamedTuple
 
 from sdrlinkd.wire import ANYBODY
 
+ALMOST_S = 1e-9
+"""Rounding of times, in s."""
+
 
 class Turn(NamedTuple):
     """The air belongs to robot `node` from `begin` to `end`, in s.

@@ -140,15 +140,18 @@ class Composer:
         return built
 
     def fill_with_records(
-        self, start: float, given: Sequence[Record] = (), number: int | None = None
+        self, start: float, first: Sequence[Record] = (), number: int | None = None
     ) -> list[BuiltPdu]:
-        """A PDU with the records `given`, or else with those that wait, for a burst at `start`;
-        with a `number` that was taken for it, it has both. Empty if there is none.
+        """A PDU with the records `first`, then with those that wait, for a burst at `start`.
+
+        It has the `number` that was taken for it, if any. Empty if there are no records.
         """
-        at = None if number is None and given else start
-        built = self._record_pdus.built(given, self.next_number if number is None else number, at)
-        self._pdus += len(built)
-        return built
+        number = self.next_number if number is None else number
+        return self._record_pdus.with_waiting(first, number, start)
+
+    def fill_with_only(self, records: Sequence[Record]) -> list[BuiltPdu]:
+        """A PDU with these records alone; empty if there are none."""
+        return self._record_pdus.with_only(records, self.next_number)
 
     def next_wakeup(self, now: float) -> float:
         """Time at which `fill` may next have something to send; −inf: now; infinity: no traffic."""
@@ -173,7 +176,8 @@ class Composer:
 
     def report(self) -> ComposerReport:
         """Counts of what was composed so far."""
-        return ComposerReport(self._entries, self._pdus, sorted(self.entry_ids.starved))
+        pdus = self._pdus + self._record_pdus.made
+        return ComposerReport(self._entries, pdus, sorted(self.entry_ids.starved))
 
     def expire(self, now: float) -> None:
         """Drop messages that are pointless to send at `now`, although no burst could leave."""
@@ -182,11 +186,6 @@ class Composer:
     def abandon(self, lane: Lane, now: float) -> None:
         """Send no more fragments of the message that `lane` has begun."""
         self._head_of_line.abandon(lane, now)
-
-    @property
-    def next_seq(self) -> int:
-        """The sequence number of our next PDU."""
-        return self.next_number & 0xFF
 
     def forwarded(self, octets: bytes, held_s: float) -> bytes:
         """Another robot's PDU, which came `held_s` before, for relaying it once more."""

@@ -23,20 +23,33 @@ class RecordPdus:
         self._piggyback = piggyback
         self._bare = bare
         self._finish = finish
+        self.made = 0
+        """Number of PDUs made so far."""
 
-    def built(self, given: Sequence[Record], number: int, start: float | None) -> list[BuiltPdu]:
-        """PDU `number` with the records `given`; empty if there is none.
+    def with_only(self, records: Sequence[Record], number: int) -> list[BuiltPdu]:
+        """PDU `number` with these records; empty if there are none."""
+        return self._built(self._draft(records), number)
 
-        For a burst at `start`, it has as many as fit of those that wait, too.
+    def with_waiting(self, first: Sequence[Record], number: int, start: float) -> list[BuiltPdu]:
+        """PDU `number`, for a burst at `start`; empty if there is nothing to tell.
+
+        It has the records `first`, and as many as fit of those that wait.
         """
+        draft = self._draft(first)
+        self._piggyback.ride(draft, start, number)
+        return self._built(draft, number)
+
+    def _draft(self, records: Sequence[Record]) -> Draft:
         draft = Draft(self._pdu_size)
-        for record in given:
+        for record in records:
             draft.add_record(build_records([record]))
-        if start is not None:
-            self._piggyback.ride(draft, start, number)
+        return draft
+
+    def _built(self, draft: Draft, number: int) -> list[BuiltPdu]:
         if draft.is_empty:
             return []
         draft.address(BROADCAST, Qos.DEFAULT)
         self._bare.ride(draft, number)
         self._bare.note(number)
+        self.made += 1
         return [self._finish(draft, number)]

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from sdrlinkd.link.qos import MAX_PRIORITY
+from sdrlinkd.link.qos import MAX_PRIORITY, MIDDLE_PRIORITY
 
 MOST_LATCHED = 64
 """Most messages that `keep_all` keeps for late joiners."""
@@ -25,7 +25,7 @@ class TopicPolicy(
 
     qos: Literal["urgent", "latency", "default", "bulk"] = "default"
     """Class of the messages, unless the producer names one."""
-    priority: Annotated[int, Meta(ge=0, le=MAX_PRIORITY)] = 64
+    priority: Annotated[int, Meta(ge=0, le=MAX_PRIORITY)] = MIDDLE_PRIORITY
     """Priority within the class, 0 to 127; 127 is the most urgent."""
     history: Literal["keep_last", "keep_all"] = "keep_last"
     """Queue history: keep_last keeps the last `depth` messages, keep_all ignores `depth`."""

@@ -39,8 +39,8 @@ class Forecast:
 
     qos: Qos
     seen_at: float
-    size: int = 0
-    """Bytes of the last message."""
+    n_pdus: int = 1
+    """PDUs that the last message needed."""
     n: int = 1
     beat_at: float = 0.0
     period_s: float = 0.0
@@ -113,8 +113,8 @@ class Forecasts:
         self.most_urgent = Qos.BULK
         """The most urgent class of any message so far."""
 
-    def note(self, key: Flow, qos: Qos, at: float, size: int = 0) -> None:
-        """Note a message of class `qos` and `size` bytes, which came at `at` on our clock."""
+    def note(self, key: Flow, qos: Qos, at: float, n_pdus: int = 1) -> None:
+        """Note a message of class `qos` that came at `at` on our clock, and its count of PDUs."""
         if qos < self.most_urgent:
             self.most_urgent = qos
         found = self._by_key.get(key)
@@ -122,10 +122,10 @@ class Forecasts:
             if len(self._by_key) >= MOST:
                 # Bounds the effort if someone forges PDUs of many robots.
                 del self._by_key[min(self._by_key, key=lambda each: self._by_key[each].seen_at)]
-            self._by_key[key] = Forecast(qos, at, size)
+            self._by_key[key] = Forecast(qos, at, n_pdus)
         elif at > found.seen_at:
             found.note(qos, at)
-            found.size = size
+            found.n_pdus = n_pdus
 
     def next_due(self, now: float, below: Qos) -> Forecast | None:
         """The periodic topic more urgent than `below` that is due first; None if there is none."""
@@ -138,7 +138,7 @@ class Forecasts:
         return first
 
     def coming(self, node: int, begin: float, end: float, *, is_relayed: bool) -> dict[Qos, int]:
-        """Bytes of each urgent class that robot `node` will have to send between two times.
+        """PDUs of each urgent class that robot `node` will have to send between two times.
 
         `is_relayed`: only of what it relays.
         """
@@ -146,7 +146,7 @@ class Forecasts:
         for key, each in self._by_key.items():
             counts = key.node == node and not (is_relayed and key.src == node)
             if counts and each.is_due(begin, end):
-                coming[each.qos] = coming.get(each.qos, 0) + each.size
+                coming[each.qos] = coming.get(each.qos, 0) + each.n_pdus
         return coming
 
     def of_team(self, begin: float, end: float) -> list[tuple[int, Forecast]]:

@@ -20,6 +20,7 @@ class Overheard:
     ) -> None:
         self._knows = knows
         self._access, self._rate = fit.settled.access, fit.rate
+        self._by_request = fit.settled.access.by_request
         self._forecasts = forecasts
         self._own_id = own_id
         self._has_control = has_control
@@ -32,8 +33,8 @@ class Overheard:
         if not is_relayed and self._knows(src, at):
             self._rate.heard(src, at)
         qos = CLASSES[pdu.qos]
-        access = self._access
-        uses = access.others_follow or (access.takes_requests and not is_relayed)
+        by_request = self._by_request is not None
+        uses = self._access.others_follow or (by_request and not is_relayed)
         if not uses or qos > Qos.LATENCY or src == self._own_id:
             return
         # Periodic urgent messages of others need the channel at their times, too.
@@ -41,21 +42,20 @@ class Overheard:
         for entry in pdu.entries:
             stamp = ages.get((entry.topic_id, entry.entry_id))
             # The age of a large message comes with its last fragment.
-            is_first = stamp is not None if access.takes_requests else not entry.index
+            is_first = stamp is not None if by_request else not entry.index
             if is_first and not (entry.topic_id == CONTROL_TOPIC_ID and self._has_control):
                 origin = at if stamp is None else at - 1e-6 * stamp.age_us
-                size = entry.total * len(entry.payload)
-                self._forecasts.note(Flow(src, src, entry.topic_id), qos, origin, size)
+                flow = Flow(src, src, entry.topic_id)
+                self._forecasts.note(flow, qos, origin, max(1, entry.total))
 
     def forwarding(self, pdu: Pdu, at: float) -> None:
         """Note a PDU that we forward: we can ask for the air for the next one in advance."""
-        if not self._access.takes_requests:
+        if self._by_request is None:
             return
         for entry in pdu.entries:
             if not entry.index and entry.total:
-                size = entry.total * len(entry.payload)
                 flow = Flow(self._own_id, pdu.src, entry.topic_id)
-                self._forecasts.note(flow, CLASSES[pdu.qos], at, size)
+                self._forecasts.note(flow, CLASSES[pdu.qos], at, entry.total)
 
     def record(self, src: int, record: Record, at: float) -> None:
         """Note a record of robot `src` on whom it hears, its presence, or its schedule."""
@@ -69,7 +69,9 @@ class Overheard:
             self._access.beacon(src, at)
         elif isinstance(record, Frame):
             self._access.take_frame(src, record, at)
+        elif self._by_request is None:
+            return
         elif isinstance(record, Grant):
-            self._access.take_grant(src, record, at)
+            self._by_request.take_grant(src, record, at)
         elif isinstance(record, Want):
-            self._access.take_want(record, at)
+            self._by_request.take_want(record, at)

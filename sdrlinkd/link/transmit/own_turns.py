@@ -8,9 +8,10 @@ message that fits.
 from collections.abc import Callable, Mapping
 from math import inf
 
-from sdrlinkd.link.access import Access, Due, Slot, Waiting, together
+from sdrlinkd.link.access import ALMOST_S, ByRequest, Due, Slot, Waiting, together
 from sdrlinkd.link.packing import BuiltPdu, Composer, PiggybackRecords
-from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.paths import Edges
+from sdrlinkd.link.qos import MIDDLE_PRIORITY, Qos
 from sdrlinkd.link.queue import Outbox
 from sdrlinkd.link.repeat import Answers
 from sdrlinkd.link.schedule import Allowance, Forecasts
@@ -18,11 +19,6 @@ from sdrlinkd.link.transmit.control_records import ControlRecords
 from sdrlinkd.link.transmit.fit import Fit
 from sdrlinkd.wire import BROADCAST, RecordType
 
-ALMOST_S = 1e-9
-"""Rounding of times, in s."""
-
-MIDDLE = 64
-"""The priority with which air is requested for repeats."""
 MOST_REPEATED = 8
 """Most PDUs to repeat for which air is requested at a time."""
 
@@ -34,12 +30,13 @@ class OwnTurns:
     """Requests air for what waits here, and fills the turns that are given for it."""
 
     def __init__(
-        self, fit: Fit, outbox: Outbox, composer: Composer, control_records: ControlRecords,
-        piggyback: PiggybackRecords, forecasts: Forecasts, answers: Answers, own_id: int,
+        self, access: ByRequest, fit: Fit, outbox: Outbox, composer: Composer,
+        control_records: ControlRecords, piggyback: PiggybackRecords, forecasts: Forecasts,
+        answers: Answers, own_id: int,
     ) -> None:  # fmt: skip
         self._answers = answers
         self._fit = fit
-        self._access: Access = fit.settled.access
+        self._access = access
         self._outbox = outbox
         self._composer = composer
         self._control_records = control_records
@@ -51,8 +48,9 @@ class OwnTurns:
         """What waits here at `now`, to be sent or repeated, with its airtime; None: nothing."""
         head, found = self._outbox.next_message, None
         if head is not None:
-            age_s, n_bytes = max(0.0, now - head.arrived_at), self._outbox.waiting_bytes()
-            found = self._needing(head.qos, head.priority, age_s, n_bytes, airtime_s)
+            k, age_s = self._composer.k_single, max(0.0, now - head.arrived_at)
+            waiting = {qos: -(-n // k) for qos, n in self._outbox.waiting_bytes().items()}
+            found = self._needing(head.qos, head.priority, age_s, waiting, airtime_s)
         repeated = None
         if self._answers.wanted:
             repeated = self._answers.due_class(now, self._composer.next_number)
@@ -60,7 +58,7 @@ class OwnTurns:
             return found
         # With a PDU that says how old they are.
         n_pdus = 1 + min(len(self._answers.wanted), MOST_REPEATED)
-        return together(found, Waiting(repeated, MIDDLE, 0.0, airtime_s(n_pdus)))
+        return together(found, Waiting(repeated, MIDDLE_PRIORITY, 0.0, airtime_s(n_pdus)))
 
     def dues(self, now: float, airtime_s: AirtimeOf) -> tuple[Due, ...]:
         """The next urgent messages of the team that can be predicted and come soon, in order."""
@@ -72,16 +70,25 @@ class OwnTurns:
         return tuple(
             Due(
                 node,
+                forecast.qos,
                 forecast.due(now) + forecast.spread_s + after_s,
-                airtime_s(1) + each_s * (max(1, self._n_pdus(forecast.size)) - 1),
+                airtime_s(1) + each_s * (forecast.n_pdus - 1),
             )
             for node, forecast in self._forecasts.of_team(now, now + 2 * self._access.round_s)
         )
 
-    def asks_at(self, earliest: float) -> float:
-        """When we may ask for what will come soon, at `earliest` or later; infinity: not."""
+    def tells_at(self, earliest: float) -> float:
+        """When there is something to tell, though nothing waits; infinity: never.
+
+        That is a plan, or from `earliest` on, a request for what will come soon.
+        """
         at = self._access.turn_at(earliest)
-        return at if at < inf and self._soon(at) else inf
+        asks_at = at if at < inf and self._soon(at) else inf
+        return min(self._access.tells_at, asks_at)
+
+    def know_links(self, edges: Edges) -> None:
+        """Take the links of the team, as they are now."""
+        self._access.know_links(edges)
 
     def fill(
         self,
@@ -133,7 +140,7 @@ class OwnTurns:
         return self._needing(min(coming), 0, 0.0, coming, airtime_s) if coming else None
 
     def _soon(self, now: float) -> Mapping[Qos, int]:
-        """Bytes by class that will come before a request made at `now` is granted.
+        """PDUs by class that will come before a request made at `now` is granted.
 
         The robot that plans expects what it has heard directly by itself.
         """
@@ -142,18 +149,15 @@ class OwnTurns:
         return self._forecasts.coming(self._own_id, now, end, is_relayed=not access.is_far)
 
     def _needing(
-        self, qos: Qos, priority: int, age_s: float, n_bytes: Mapping[Qos, int],
+        self, qos: Qos, priority: int, age_s: float, n_pdus: Mapping[Qos, int],
         airtime_s: AirtimeOf,
     ) -> Waiting:  # fmt: skip
-        """Messages of `n_bytes` by class, of which the most urgent has class `qos`."""
+        """Messages that need `n_pdus` by class, of which the most urgent has class `qos`."""
         one_s = airtime_s(1)
         each_s = airtime_s(2) - one_s
-        air_s = {each: each_s * self._n_pdus(n) for each, n in n_bytes.items() if n}
+        air_s = {each: each_s * n for each, n in n_pdus.items()}
         lower_s = sum(needs_s for each, needs_s in air_s.items() if each > qos)
         return Waiting(qos, priority, age_s, max(air_s.get(qos, 0.0), one_s), lower_s)
-
-    def _n_pdus(self, n_bytes: int) -> int:
-        return -(-n_bytes // self._composer.k_single)
 
     def _is_full(self, waiting: Waiting | None, longest_s: float, airtime_s: AirtimeOf) -> bool:
         """Whether urgent messages need all of a burst, so that records wait for another turn.

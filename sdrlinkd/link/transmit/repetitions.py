@@ -107,5 +107,5 @@ class Repetitions:
 
     def _made(self, records: Sequence[Record], start: float) -> list[bytes]:
         """A PDU with these records, for the air."""
-        pdus = [pdu.data for pdu in self._composer.fill_with_records(start, records)]
+        pdus = [pdu.data for pdu in self._composer.fill_with_only(records)]
         return [self._sealing.seal(pdu, start) for pdu in pdus] if self._sealing.is_on else pdus

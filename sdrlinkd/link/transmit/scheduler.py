@@ -111,8 +111,9 @@ class BurstScheduler:
         self._fit = fit
         self._access, self._rate = fit.settled.access, fit.rate
         self._answers.set_slower(fit.slower)
-        self._turns = OwnTurns(
-            fit, self._outbox, self._composer, self._control_records, self._piggyback,
+        by_request = self._access.by_request
+        self._turns = None if by_request is None else OwnTurns(
+            by_request, fit, self._outbox, self._composer, self._control_records, self._piggyback,
             self._forecasts, self._answers, self._own_id,
         )  # fmt: skip
         self._overheard = Overheard(
@@ -142,14 +143,16 @@ class BurstScheduler:
                 if burst is not None:
                     self._has_repeated = True
                     return burst
-        if head is None and earliest < records_due_at and not self._tells(earliest):
+        turns = self._turns
+        tells_at = inf if turns is None else turns.tells_at(earliest)
+        if head is None and earliest < min(records_due_at, tells_at):
             return None
         qos, mcs = Qos.DEFAULT if head is None else head, rate.lowest
         if rate.adapts and head is not None:
             mcs = rate.mcs(self._outbox.destinations(), qos, earliest)
-        waiting, turns = None, self._turns
+        waiting = None
         dues: tuple[Due, ...] = ()
-        if access.takes_requests:
+        if turns is not None:
             waiting = turns.waiting(earliest, partial(airtime_s, mcs))
             dues = turns.dues(earliest, partial(airtime_s, mcs))
         slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed, waiting, dues))
@@ -167,7 +170,7 @@ class BurstScheduler:
         is_timed = frame is not None and records.tells_schedule(start)
         cannot_wait = records.collect(start, frame, rate)
         first_number = composer.next_number
-        if access.takes_requests:
+        if turns is not None:
             built, n_records = turns.fill(
                 slot, allowance, partial(airtime_s, mcs), waiting, cannot_wait=cannot_wait
             )
@@ -195,8 +198,9 @@ class BurstScheduler:
         classes = [pdu.qos for pdu in built]
         self._spend(length_s, classes)
         pdus = [pdu.data for pdu in built]
-        numbers = list(range(first_number, first_number + len(built)))
-        if access.takes_requests:
+        if turns is None:
+            numbers = list(range(first_number, first_number + len(built)))
+        else:
             # PDUs of others may be between ours, which then follow each other.
             ours = accumulate(pdu.src == self._own_id for pdu in built)
             numbers = [first_number + n - 1 for n in ours]
@@ -276,9 +280,9 @@ class BurstScheduler:
         if wakes_at <= now and self._held.is_settled:
             wakes_at = self._held.until
         wakes_at = min(self._control_records.due_at, wakes_at, self._answers.due_at(now))
-        if self._access.takes_requests:
-            earliest = now + self._fit.lead_s
-            wakes_at = min(wakes_at, self._tells_at(earliest) - self._fit.lead_s)
+        if self._turns is not None:
+            lead_s = self._fit.lead_s
+            wakes_at = min(wakes_at, self._turns.tells_at(now + lead_s) - lead_s)
         return max(wakes_at, self._numbers_at)
 
     def clear(self) -> None:
@@ -309,7 +313,8 @@ class BurstScheduler:
 
     def know_links(self, edges: Edges) -> None:
         """Take the links of the team, as they are now."""
-        self._access.know_links(edges)
+        if self._turns is not None:
+            self._turns.know_links(edges)
 
     def access_notices(self, now: float) -> list[str]:
         """What a person should know about the access policy, in sentences."""
@@ -337,14 +342,6 @@ class BurstScheduler:
             rate.lowest if rate.adapts else None,
             tuple(rate.changes),
         )
-
-    def _tells_at(self, earliest: float) -> float:
-        """When the access policy has something to tell, though nothing waits; infinity: never."""
-        return min(self._access.tells_at, self._turns.asks_at(earliest))
-
-    def _tells(self, earliest: float) -> bool:
-        """Whether the access policy has something to tell at `earliest`."""
-        return self._access.takes_requests and self._tells_at(earliest) <= earliest
 
     def _again(self, opportunity: Opportunity) -> Burst | None:
         """The first burst of the retry queue in a new slot; None if there is no slot yet."""
@@ -384,7 +381,7 @@ class BurstScheduler:
 
     def _may_seal(self, start: float, n: int) -> bool:
         """Whether there are numbers for `n` PDUs of ours in a burst at `start`."""
-        if self._sealing.may_send(start, self._composer.next_seq, n):
+        if self._sealing.may_send(start, self._composer.next_number & 0xFF, n):
             return True
         self._numbers_at = start + TICK_S
         return False
@@ -431,7 +428,7 @@ class BurstScheduler:
         if two_s > one_s:
             self.bytes_per_s = self._composer.k_single / (two_s - one_s)
         most_s = longest_s if made_by is None else min(longest_s, max(one_s, made_by(slot.start)))
-        if access.takes_requests:
+        if self._turns is not None:
             # Turns are short enough for what is urgent.
             most = opportunity.most_pdus(mcs, most_s)
             allowance = Allowance(tuple(most if qos in asked else 0 for qos in Qos))
