@@ -21,12 +21,13 @@ from phy.layout import BurstLayout, layout, most_pdus
 from phy.mcs import MCS_TABLE, SLOWER_MCS, Mcs
 from phy.numerology import GRIDS, OFDM_64_8, OFDM_64_16, Numerology
 from phy.quality import COUNTERS, BurstOver, BurstQuality, Claim, Event, PduHeard
-from phy.sizes import SENSE_WINDOW
+from phy.sizes import N_PULSE, SENSE_WINDOW
 
 if TYPE_CHECKING:
     from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
     from phy.engine import Engine, EngineError
     from phy.oversampling import REACH, Downsampler, upsample
+    from phy.pulses import pulse
     from phy.receiver import Receiver
     from phy.sensing import EnergyDetector
     from phy.transmitter import Transmitter
@@ -39,6 +40,7 @@ __all__ = [
     "MAX_PDU_BYTES",
     "MCS_TABLE",
     "N_NETWORKS",
+    "N_PULSE",
     "OFDM_64_8",
     "OFDM_64_16",
     "PROFILES",
@@ -72,6 +74,7 @@ __all__ = [
     "pdu_error_rate",
     "pdu_lost_rate",
     "points",
+    "pulse",
     "upsample",
     "warm_up",
 ]
@@ -80,6 +83,7 @@ _LATER = {
     "phy.channel": ("PROFILES", "FrontEnd", "FrontEndParams", "Path", "PathParams"),
     "phy.engine": ("Engine", "EngineError"),
     "phy.oversampling": ("REACH", "Downsampler", "upsample"),
+    "phy.pulses": ("pulse",),
     "phy.sensing": ("EnergyDetector",),
     "phy.warmup": ("warm_up",),
 }

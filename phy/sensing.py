@@ -7,7 +7,21 @@ from numpy.typing import NDArray
 
 from phy import compute
 from phy.stream import LARGEST_SAMPLE
-from phy.tables.sensing import BUSY_UNTIL, FILLED, FLOOR, LEAST_FLOOR, N_STATE, NEXT
+from phy.tables.sensing import (
+    BUSY_UNTIL,
+    CARRIER_UNTIL,
+    FILLED,
+    FLOOR,
+    LEAST_FLOOR,
+    LEAST_PULSE,
+    MOST_PULSE,
+    MOST_SHORT,
+    N_SHORT,
+    N_STATE,
+    NEXT,
+    RUN_FROM,
+    SHORT,
+)
 
 
 class EnergyDetector:
@@ -16,6 +30,9 @@ class EnergyDetector:
     The floor starts as the first window's power and follows quiet windows (at once to a power below
     half, otherwise by 1/64 of the difference). It doubles in 2^17 busy windows, so that a permanent
     signal becomes noise. Windows are contiguous from `start` on.
+
+    Busy windows with at most three quiet ones in between are a run. A run as short as a pulse of
+    energy may be one; a longer one is a carrier.
     """
 
     def __init__(self, threshold_db: float = 6.0, start: int = 0) -> None:
@@ -24,7 +41,7 @@ class EnergyDetector:
         self.threshold_db = threshold_db
         self._threshold = 10 ** (threshold_db / 10)
         self._state = np.zeros(N_STATE)
-        self._state[[BUSY_UNTIL, NEXT]] = start
+        self._state[[BUSY_UNTIL, NEXT, RUN_FROM, CARRIER_UNTIL]] = start
 
     @property
     def next_index(self) -> int:
@@ -35,6 +52,24 @@ class EnergyDetector:
     def busy_until(self) -> int:
         """Absolute index after the last busy window; `start` if there has been none."""
         return int(self._state[BUSY_UNTIL])
+
+    @property
+    def carrier_until(self) -> int:
+        """Absolute index after the last busy window of a carrier; `start` if there was none."""
+        return int(self._state[CARRIER_UNTIL])
+
+    @property
+    def pulses(self) -> list[int]:
+        """Absolute indices at which the last runs began that may be pulses, ascending.
+
+        They are exact to a window. The last one may still turn out to be the begin of a carrier.
+        """
+        state, n = self._state, int(self._state[N_SHORT])
+        found = [int(state[SHORT + i % MOST_SHORT]) for i in range(max(0, n - MOST_SHORT), n)]
+        length = state[BUSY_UNTIL] - state[RUN_FROM]
+        if LEAST_PULSE <= length <= MOST_PULSE and state[NEXT] > state[BUSY_UNTIL]:
+            found.append(int(state[RUN_FROM]))
+        return found
 
     @property
     def noise_dbfs(self) -> float:

@@ -4,6 +4,8 @@ N_COLUMNS = 24
 """Number of block columns of an LDPC code of IEEE 802.11."""
 SENSE_WINDOW = 64
 """Number of samples of which the energy detector takes the mean power."""
+N_PULSE = 3 * SENSE_WINDOW
+"""Length of a pulse of energy in samples: wherever it begins, two whole windows lie inside."""
 NOISE_CHUNK = 1024
 """Number of noise samples with one pair of keys; also the size of the working memory."""
 MAX_LLR = 511

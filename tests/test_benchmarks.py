@@ -56,6 +56,8 @@ ROWS = {
         "grant_halfduplex_50ms_urgent_p99_over_frame_standing",
         "grant_halfduplex_50ms_urgent_p99_over_frame_request",
         "reroute_s", "reroute_to_all_s",
+        "urgent_p99_ms_8", "urgent_p99_ms_24", "carried_mbps_8", "carried_mbps_24",
+        "default_over_bulk_max_ms_8",
     },
     "modem_path": {
         "odom_30hz_latency_ms_p50",

@@ -37,13 +37,13 @@ CDR = b"\0\1\0\0"
 TOPIC_TYPE = "std_msgs/msg/UInt8MultiArray"
 
 
-Policy = Literal["csma", "minislot", "tdma", "grant"]
+Policy = Literal["csma", "minislot", "tdma", "grant", "auction"]
 
 
 class Flow(NamedTuple):
     """`n` messages of `size` octets that robot `src` sends every `period_s` from `begin_s` on.
 
-    Those to everyone are counted at robot `counted_at`.
+    Those to everyone are counted at robot `counted_at`. Flows of one name have the same topic.
     """
 
     name: str
@@ -92,21 +92,25 @@ class Team:
     def __init__(
         self, ids: Iterable[int], links: Collection[tuple[int, int]], flows: Sequence[Flow],
         seed: int, policy: Policy = "tdma", pdu_size: int = PDU_SIZE,
-        turnaround_s: float = TURNAROUND_S, snr_db: float = GOOD_DB,
+        turnaround_s: float = TURNAROUND_S, snr_db: float = GOOD_DB, modem: ModemParams = MODEM,
     ) -> None:  # fmt: skip
         self._pdu_size = pdu_size
+        self._topics = [*dict.fromkeys(flow.name for flow in flows)]
         self.ids = list(ids)
         self.heard = [
             Heard(flow, flow.times(Random(1000 * seed + i))) for i, flow in enumerate(flows)
         ]
         chance = Random(seed)
-        air = AirParams(rate_hz=RATE_HZ, block_s=MODEM.block_s, snr_db=snr_db)
+        self._by_topic = {
+            (self._topics.index(heard.flow.name), heard.flow.src): heard for heard in self.heard
+        }
+        air = AirParams(rate_hz=RATE_HZ, block_s=modem.block_s, snr_db=snr_db)
         deaf = [
             LinkOverride(sender=a, receiver=b, snr_db=NONE_DB)
             for a, b in permutations(self.ids, 2)
             if (a, b) not in links and (b, a) not in links
         ]
-        registry = make_registry([(flow.name, TOPIC_TYPE) for flow in flows])
+        registry = make_registry([(name, TOPIC_TYPE) for name in self._topics])
         radios = {
             node: RadioParams(
                 full_duplex=False, turnaround_s=turnaround_s,
@@ -119,8 +123,8 @@ class Team:
             World(air, {}, deaf),
             radios,
             {node: self._link(node, registry, seed) for node in self.ids},
-            MODEM,
-            Airtimes(MODEM, pdu_size),
+            modem,
+            Airtimes(modem, pdu_size),
             AccessParams(policy=policy, nodes=self.ids, force=True),
             {node: self._arrivals(node) for node in self.ids},
             seed=seed,
@@ -160,8 +164,8 @@ class Team:
         )
         link.set_policies(
             {
-                i: TopicPolicy(dst=each.flow.dst, qos=each.flow.qos)
-                for i, each in enumerate(self.heard)
+                topic_id: TopicPolicy(dst=each.flow.dst, qos=each.flow.qos)
+                for (topic_id, _), each in self._by_topic.items()
             }
         )
         return link
@@ -170,12 +174,12 @@ class Team:
         """The messages of a robot in order of time; each begins with its number."""
         return sorted(
             Arrival(at, topic_id, CDR + number.to_bytes(4, "little") + bytes(heard.flow.size))
-            for topic_id, heard in enumerate(self.heard)
-            if heard.flow.src == node
+            for (topic_id, src), heard in self._by_topic.items()
+            if src == node
             for number, at in enumerate(heard.sent_at)
         )
 
     def _listen(self, node: int, message: Delivered, now: float) -> None:
-        heard = self.heard[message.topic_id]
+        heard = self._by_topic[message.topic_id, message.src]
         if node in (heard.flow.dst, heard.flow.counted_at):
             heard.at.setdefault(int.from_bytes(message.payload[4:8], "little"), now)

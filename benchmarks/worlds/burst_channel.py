@@ -31,6 +31,8 @@ from benchmarks.worlds.flight import (
 NEVER = -1.0
 TAIL = 2 * phy.SENSE_WINDOW
 """Samples by which energy may seem to last longer than the header says."""
+PULSES_S = 0.1
+"""Time for which a pulse is kept."""
 KEEP_S = 1.0
 """Maximum time for which a burst is kept after its end."""
 
@@ -45,6 +47,19 @@ class AirSense(NamedTuple):
     until: float
     idle_since: float
     burst_at: float | None
+    carrier_end: float = 0.0
+    carrier_at: float | None = None
+    pulses: tuple[float, ...] = ()
+    """When pulses began that have ended, since the end of the last burst."""
+
+
+class _Pulse(NamedTuple):
+    """A pulse of energy, which arrives at each node that it is strong enough for."""
+
+    sender: int
+    start_s: float
+    length_s: float
+    arrives: dict[int, float]
 
 
 @dataclass(slots=True)
@@ -85,6 +100,7 @@ class BurstChannel:
         self._nodes: dict[int, _Node] = {}
         self._hops: dict[int, tuple[float, dict[int, Hop]]] = {}
         self._live: list[Flight] = []
+        self._pulses: list[_Pulse] = []
 
     def join(self, node: int, radio: RadioParams) -> Capabilities:
         """Add a node; returns the capabilities of its radio."""
@@ -119,6 +135,17 @@ class BurstChannel:
             sender.deaf = [each for each in sender.deaf if each[1] > oldest_s]
             sender.deaf.append((start_s - turn_s, flight.end_s + turn_s))
         return flight
+
+    def pulse(self, node: int, start_s: float, length_s: float) -> None:
+        """Put a pulse on the air. It takes no part in the losses of bursts."""
+        hops = self._hops_of(node, start_s)
+        arrives = {
+            other: start_s + hop.delay_s
+            for other, hop in hops.items()
+            if hop.snr_db > self._loud_db
+        }
+        kept = [each for each in self._pulses if each.start_s > start_s - PULSES_S]
+        self._pulses = [*kept, _Pulse(node, start_s, length_s, arrives)]
 
     def readers(self, flight: Flight, number: int, nodes: Sequence[int]) -> list[tuple[int, float]]:
         """Those of `nodes` that decode a PDU, with the SNR in dB that their receivers report.
@@ -161,10 +188,34 @@ class BurstChannel:
                 energy_end = max(energy_end, self._energy_end(flight, node, at, t))
                 if begin < at <= t - flight.shape.head_s and self._finds(flight, node, at):
                     begin, end = at, at + flight.shape.airtime_s
-        if energy_end <= end + TAIL / self._air.rate_hz:
-            return AirSense(t, end, begin)
-        is_over = energy_end + TAIL / self._air.rate_hz <= t
-        return AirSense(t, energy_end if is_over else t + 1 / self._air.rate_hz, None)
+        tail_s = TAIL / self._air.rate_hz
+        burst_at: float | None = begin
+        if energy_end > end + tail_s:
+            is_over = energy_end + tail_s <= t
+            end, burst_at = energy_end if is_over else t + 1 / self._air.rate_hz, None
+        pulses = self._heard_pulses(node, end, t)
+        if not pulses:
+            return AirSense(t, end, burst_at, end, burst_at)
+        return AirSense(t, pulses[-1][1], None, end, burst_at, tuple(at for at, _ in pulses))
+
+    def _heard_pulses(self, node: int, since: float, t: float) -> list[tuple[float, float]]:
+        """(begin, end) of the pulses that a node has heard completely between two times."""
+        turn_s, tail_s = self._nodes[node].radio.turnaround_s, TAIL / self._air.rate_hz
+        deaf = [
+            (each.start_s - turn_s, each.start_s + each.length_s + turn_s)
+            for each in self._pulses
+            if each.sender == node and not self._nodes[node].radio.full_duplex
+        ]
+        found = []
+        for each in self._pulses:
+            begin = each.arrives.get(node)
+            if begin is None or begin <= since or begin + each.length_s + tail_s > t:
+                continue
+            end = begin + each.length_s
+            is_lost = any(first < end and begin < last for first, last in deaf)
+            if not is_lost and not self._is_deaf(node, begin, end):
+                found.append((begin, end))
+        return sorted(found)
 
     def _hops_of(self, sender: int, t: float) -> dict[int, Hop]:
         if self._world.is_out(t):

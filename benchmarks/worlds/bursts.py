@@ -1,8 +1,8 @@
 """Simulates hours of many robots in seconds: real links on an air of bursts, in virtual time."""
 
 import math
-from collections import Counter, defaultdict, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from itertools import count
@@ -11,7 +11,9 @@ import phy
 from backends import AirParams, RadioParams, World
 from benchmarks.worlds.arrivals import Arrival
 from benchmarks.worlds.burst_channel import BurstChannel
+from benchmarks.worlds.chances import at_pace, next_chance
 from benchmarks.worlds.flight import Flight
+from benchmarks.worlds.station import Station
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
     AS_CONFIGURED,
@@ -24,8 +26,6 @@ from sdrlinkd.link import (
     Overrides,
     PduLinkTraits,
     RateParams,
-    Sensed,
-    Settled,
 )
 from sdrlinkd.modem import Airtimes, pdu_link_traits
 
@@ -48,27 +48,6 @@ class Pair:
     """Sum over all messages."""
     ages_s: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT_AGES))
     """The most recent ages."""
-
-
-@dataclass(slots=True, eq=False)
-class Station:
-    """A robot: its link, and the few parts of a modem that it needs."""
-
-    link: Link
-    traits: PduLinkTraits
-    settled: Settled
-    pace: float
-    """Rate of its own crystal, by which its link counts time."""
-    arrivals: Iterator[Arrival]
-    least_s: float
-    """Least duration of a burst with what follows it."""
-    look_at: float = INFINITE
-    """The next block at which to query the link."""
-    free_at: float = 0.0
-    ticked_at: float = 0.0
-    sent: Counter[int] = field(default_factory=Counter)
-    """Number of messages handed over, by topic id."""
-    bursts: int = 0
 
 
 _Event = tuple[int, int, int, Callable[..., None], tuple[object, ...]]
@@ -194,10 +173,8 @@ class Simulation:
             looks_at = max(link.next_wakeup(now), station.free_at - traits.lead_s - traits.ahead_s)
             if looks_at > now:
                 break
-            until, idle_since, burst_at = self._medium.sensed(link.own_id, self.now)
-            burst_at = None if burst_at is None else burst_at * pace
-            sensed = Sensed(until * pace, idle_since * pace, burst_at)
-            looks_at = _next_chance(station, self._policy, self._access, sensed, now)
+            sensed = at_pace(self._medium.sensed(link.own_id, self.now), pace)
+            looks_at = next_chance(station, self._policy, self._access, sensed, now)
             if looks_at > now:
                 break
             earliest = max(now + traits.lead_s, station.free_at)
@@ -214,6 +191,12 @@ class Simulation:
     def _send(self, station: Station, burst: Burst) -> None:
         link, pace, n_pdus = station.link, station.pace, len(burst.pdus)
         start_s, size = burst.start / pace, link.params.pdu_size
+        if burst.is_pulse:
+            self._medium.pulse(link.own_id, start_s, burst.airtime_s / pace)
+            station.free_at = burst.start + burst.airtime_s + station.traits.gap_s
+            left = self._block(start_s + burst.airtime_s)
+            self._at(left, _HEAR, link.confirm, burst, Outcome.SENT, burst.start)
+            return
         flight = self._medium.send(link.own_id, start_s, burst.mcs, n_pdus, size)
         station.free_at = (flight.end_s + station.traits.gap_s) * pace
         station.bursts += 1
@@ -253,36 +236,3 @@ class Simulation:
                 station.ticked_at = self.now
                 link.handle_timers(self.now * station.pace)
         self._at(self._block(self.now + TICK_S), _ARRIVE, self._tick)
-
-
-def _next_chance(
-    station: Station, name: str, access: AccessParams, sensed: Sensed, t: float
-) -> float:
-    """Earliest time after `t` at which the link can decide differently, if nothing new arrives.
-
-    All times are by the station's clock. In tdma that is its own slot. With reuse it is also the
-    slots before that, at its mini-slots after their start or after the end of a burst in them.
-    """
-    policy, traits = station.settled.access, station.traits
-    if policy.by_request is not None:
-        return max(t, policy.by_request.turn_at(t + traits.lead_s) - traits.lead_s - traits.react_s)
-    frame = policy.frame(t + traits.lead_s)
-    carrier_end = -INFINITE if sensed.burst_at is None else sensed.idle_since
-    if name in ("csma", "minislot"):
-        return max(t, carrier_end, station.free_at - traits.gap_s)
-    if frame is None:
-        return t
-    n, phase_s = len(access.nodes), 1e-6 * frame.phase_us
-    rank, slot_s = access.nodes.index(station.link.own_id), policy.round_s / n
-    minislot_s = access.minislot_s or traits.lead_s + traits.react_s + traits.detect_s
-    first = int(phase_s / slot_s)
-    begin = t + traits.lead_s - phase_s + first * slot_s
-    turns = (rank - first) % n
-    own = begin + turns * slot_s - traits.lead_s - traits.react_s - traits.ahead_s
-    for turn in range(turns, 0, -1):
-        look = max(begin - minislot_s, carrier_end) + turn * minislot_s
-        begin += slot_s
-        soonest = max(t + traits.lead_s, look + minislot_s)
-        if access.reuse and soonest + station.least_s < begin:
-            return max(t, min(look, own))
-    return max(t, own)

@@ -9,7 +9,22 @@ from numba import njit
 from numpy.typing import NDArray
 
 from phy.sizes import SENSE_WINDOW as WINDOW
-from phy.tables.sensing import BUSY_UNTIL, FILLED, FLOOR, LEAST_FLOOR, NEXT, POWERS
+from phy.tables.sensing import (
+    APART,
+    BUSY_UNTIL,
+    CARRIER_UNTIL,
+    FILLED,
+    FLOOR,
+    LEAST_FLOOR,
+    LEAST_PULSE,
+    MOST_PULSE,
+    MOST_SHORT,
+    N_SHORT,
+    NEXT,
+    POWERS,
+    RUN_FROM,
+    SHORT,
+)
 
 # A permanent signal becomes noise: the floor doubles in this many busy windows.
 DOUBLING = 1 << 17
@@ -60,8 +75,7 @@ def _judge(
     floor = state[FLOOR]
     busy = floor > 0 and power > threshold * floor
     if busy:
-        state[BUSY_UNTIL] = end
-    if busy:
+        _note_energy(end, state)
         floor *= _CREEP
     elif spoilt:
         # The window's power is too low by an unknown amount; too low a floor would make all noise
@@ -72,6 +86,21 @@ def _judge(
     else:
         floor += _WEIGHT * (power - floor)
     state[FLOOR] = max(floor, LEAST_FLOOR)
+
+
+@njit(nogil=True, cache=True)
+def _note_energy(end: float, state: NDArray[np.float64]) -> None:
+    """Note a busy window that ends at index `end`: its run goes on, or a new one begins."""
+    last = state[BUSY_UNTIL]
+    if end - WINDOW >= last + APART:
+        length = last - state[RUN_FROM]
+        if LEAST_PULSE <= length <= MOST_PULSE:
+            state[SHORT + int(state[N_SHORT]) % MOST_SHORT] = state[RUN_FROM]
+            state[N_SHORT] += 1
+        state[RUN_FROM] = end - WINDOW
+    state[BUSY_UNTIL] = end
+    if end - state[RUN_FROM] > MOST_PULSE:
+        state[CARRIER_UNTIL] = end
 
 
 @njit(nogil=True, cache=True)

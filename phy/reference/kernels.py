@@ -10,7 +10,22 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from phy.sizes import NOISE_CHUNK, SENSE_WINDOW
-from phy.tables.sensing import BUSY_UNTIL, FILLED, FLOOR, LEAST_FLOOR, NEXT, POWERS
+from phy.tables.sensing import (
+    APART,
+    BUSY_UNTIL,
+    CARRIER_UNTIL,
+    FILLED,
+    FLOOR,
+    LEAST_FLOOR,
+    LEAST_PULSE,
+    MOST_PULSE,
+    MOST_SHORT,
+    N_SHORT,
+    NEXT,
+    POWERS,
+    RUN_FROM,
+    SHORT,
+)
 
 DOUBLING = 1 << 17
 """A permanent signal becomes noise: the floor doubles in this many busy windows."""
@@ -115,7 +130,13 @@ def sense(
     floor, busy_until = float(state[FLOOR]), state[BUSY_UNTIL]
     for number, (power, is_whole) in enumerate(zip(means.tolist(), whole.tolist(), strict=True)):
         if 0 < threshold * floor < power:
-            busy_until = end - filled + (number + 1) * SENSE_WINDOW
+            window_at = end - filled + number * SENSE_WINDOW
+            if window_at >= busy_until + APART:
+                _end_run(busy_until - state[RUN_FROM], state)
+                state[RUN_FROM] = window_at
+            busy_until = window_at + SENSE_WINDOW
+            if busy_until - state[RUN_FROM] > MOST_PULSE:
+                state[CARRIER_UNTIL] = busy_until
             floor *= 2 ** (1 / DOUBLING)
         elif is_whole and (floor == 0 or power < floor / 2):
             floor = max(power, LEAST_FLOOR)
@@ -125,6 +146,13 @@ def sense(
     state[FLOOR], state[BUSY_UNTIL], state[NEXT] = floor, busy_until, end + len(x)
     state[FILLED] = len(rest)
     state[POWERS : POWERS + len(rest)] = rest
+
+
+def _end_run(length: float, state: NDArray[np.float64]) -> None:
+    """Note where a run of busy windows began that was as long as a pulse."""
+    if LEAST_PULSE <= length <= MOST_PULSE:
+        state[SHORT + int(state[N_SHORT]) % MOST_SHORT] = state[RUN_FROM]
+        state[N_SHORT] += 1
 
 
 KERNELS: dict[str, Callable[..., None]] = {

@@ -34,6 +34,7 @@ class Policy(StrEnum):
     NONE = "none"
     CSMA = "csma"
     MINISLOT = "minislot"
+    AUCTION = "auction"
     TDMA = "tdma"
     GRANT = "grant"
 

@@ -205,6 +205,13 @@ class Link:
     def attach(self, traits: PduLinkTraits, access: AccessParams, rate: RateParams) -> Fit:
         """Fit the link to a radio that is up. Raises ConfigError and then changes nothing."""
         fit = fit_to(traits, access, rate, self.own_id, self._rng)
+        access_is = fit.settled.access
+        asks = access_is.by_request is not None or access_is.by_auction is not None
+        if asks and not self.registry.has_control:
+            raise ConfigError(
+                f'access.policy: got "{fit.settled.policy}", which tells what waits in records; '
+                "16 topics in the registry leave no number for them: allowed are 15"
+            )
         missing = LEAST_ROOM - self._composer.k_single
         if fit.settled.policy == "grant" and missing > 0:
             size = self._clear_size

@@ -48,6 +48,8 @@ class PduLinkTraits(NamedTuple):
     slower: tuple[int, ...] = ()
     """By MCS, the one with the same code rate and the next lower modulation, or itself; without an
     entry: itself."""
+    pulse_s: float = 0.0
+    """Length of a pulse of energy that others detect; 0: the radio sends none."""
     stamp_s: float = 2e-4
     """Largest error of the times at which bursts left and came."""
 
@@ -60,12 +62,17 @@ class Sensed(NamedTuple):
     """The receiver's view of the channel, up to `until`.
 
     The channel has been idle since `idle_since`; while it is busy, that is later than `until`.
-    `burst_at` is the time of the last burst's preamble, None if only energy was detected.
+    `burst_at` is the time of the last burst's preamble, None if only energy was detected. Energy
+    that lasts no longer than a pulse may be one: `carrier_end` and `carrier_at` are end and
+    preamble of what was longer, and `pulses` tells when the pulses after that began.
     """
 
     until: float = inf
     idle_since: float = 0.0
     burst_at: float | None = None
+    carrier_end: float = 0.0
+    carrier_at: float | None = None
+    pulses: tuple[float, ...] = ()
 
 
 class Opportunity(NamedTuple):

@@ -49,4 +49,5 @@ def pdu_link_traits(
         mcs=params.mcs,
         needed_snr_db=airtimes.needed_snr_db(),
         slower=phy.SLOWER_MCS,
+        pulse_s=phy.N_PULSE / params.rate_hz,
     )

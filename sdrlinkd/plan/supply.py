@@ -78,6 +78,11 @@ def supply_of(
         return Supply(
             access.round_s + decided_s, pause_s=pauses, passed_s=robots * slot_s, others=robots - 1
         )
+    if settled.policy == "auction":
+        pauses = (access.pause_s,) * len(Qos)
+        # Wait for a round that has begun, and then for a contest.
+        gap_s = access.pause_s + access.round_s + decided_s
+        return Supply(gap_s, pause_s=pauses, others=robots - 1)
     if settled.policy == "csma":
         return _by_chance(settled, robots, decided_s)
     return Supply(decided_s)

@@ -98,7 +98,7 @@ def printed(capsys, *words):
 
 def test_help_shows_keys_sections_pages_names_and_commands(capsys):
     assert "late-joiners" in printed(capsys)
-    assert 'Takes one of "auto"' in printed(capsys, "access.policy")
+    assert 'Takes one of "auction", "auto"' in printed(capsys, "access.policy")
     assert "relay.routes" in printed(capsys, "relay")
     assert "durability" in printed(capsys, "late-joiners")
     assert "--rate" in printed(capsys, "bag", "play")

@@ -193,15 +193,15 @@ def test_a_read_header_tells_when_the_air_is_free():
     made = medium(2)
     flight = send(made, 0, 1.0)
     head_s, end_s = flight.shape.head_s, flight.end_s
-    assert made.sensed(1, 0.9) == (0.9, 0.0, -1.0)
+    assert made.sensed(1, 0.9)[:3] == (0.9, 0.0, -1.0)
     at = 1.0 + head_s / 2
-    until, idle_since, burst_at = made.sensed(1, at)
+    until, idle_since, burst_at, *_ = made.sensed(1, at)
     assert (until, burst_at) == (at, None)
     assert idle_since > at
-    assert made.sensed(1, 1.0 + head_s)[1:] == (end_s, 1.0)
+    assert made.sensed(1, 1.0 + head_s)[1:3] == (end_s, 1.0)
     made.settle(flight)
-    assert made.sensed(1, 77.0) == (77.0, end_s, 1.0)
-    assert made.sensed(0, 77.0) == (77.0, 0.0, -1.0), "nobody senses itself"
+    assert made.sensed(1, 77.0)[:3] == (77.0, end_s, 1.0)
+    assert made.sensed(0, 77.0)[:3] == (77.0, 0.0, -1.0), "nobody senses itself"
 
 
 def test_a_burst_that_cannot_be_read_is_still_a_carrier():
@@ -209,14 +209,14 @@ def test_a_burst_that_cannot_be_read_is_still_a_carrier():
     made = medium(3)
     first = send(made, 0, 1.0)
     second = send(made, 1, first.end_s - 0.001, n_pdus=2)
-    assert made.sensed(2, second.start_s + 1e-4)[1:] == (first.end_s, 1.0)
+    assert made.sensed(2, second.start_s + 1e-4)[1:3] == (first.end_s, 1.0)
     at = second.end_s - 1e-4
     assert made.sensed(2, at).idle_since > at
     assert made.sensed(2, at).burst_at is None
     for flight in (first, second):
         assert not got(made, flight, 2)
         made.settle(flight)
-    assert made.sensed(2, 2.0) == (2.0, second.end_s, None)
+    assert made.sensed(2, 2.0)[:3] == (2.0, second.end_s, None)
 
 
 @pytest.mark.parametrize(("snr_db", "is_noticed"), [(4.5, False), (5.0, True)])
@@ -229,7 +229,7 @@ def test_a_carrier_is_noticed_from_carrier_db_on(snr_db, is_noticed):
     made.settle(flight)
     made.settle(own)
     told = (2.0, flight.end_s, None) if is_noticed else (2.0, 0.0, -1.0)
-    assert made.sensed(1, 2.0) == told
+    assert made.sensed(1, 2.0)[:3] == told
 
 
 def test_who_is_deaf_notices_nothing():
@@ -248,7 +248,7 @@ def test_the_last_carrier_is_never_forgotten():
         other = send(made, 2, 2 * KEEP_S * number)
         assert other.near == []
     made.settle(flight)
-    assert made.sensed(1, 120.0) == (120.0, flight.end_s, 0.0)
+    assert made.sensed(1, 120.0)[:3] == (120.0, flight.end_s, 0.0)
 
 
 def test_a_burst_begins_when_the_one_before_is_over():

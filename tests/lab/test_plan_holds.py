@@ -121,6 +121,7 @@ CASES = [
         ("tdma", (1, 2, 3), ("blocks", "usrp", "turns_slowly")),
         ("minislot", (1, 2, 3), ("soon",)),
         ("grant", (1, 2, 3), ("blocks", "usrp", "turns_slowly")),
+        ("auction", (1, 2, 3), ("soon",)),
     )
     for robots in team
     for radio in radios

@@ -125,7 +125,7 @@ def test_without_access_it_loses_what_samples_lose():
         assert by_bursts[pair][1] == pytest.approx(age_s, rel=0.1)
 
 
-@pytest.mark.parametrize("policy", ["minislot", "tdma"])
+@pytest.mark.parametrize("policy", ["minislot", "auction", "tdma"])
 def test_with_access_it_delivers_as_samples_do(policy):
     by_samples, by_bursts, sent = two_at_40_percent(policy)
     assert by_samples.keys() == by_bursts.keys() == {(1, 2), (2, 1)}
@@ -223,13 +223,13 @@ def test_a_chain_keeps_one_schedule():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("policy", ["none", "csma", "minislot", "tdma"])
+@pytest.mark.parametrize("policy", ["none", "csma", "minislot", "auction", "tdma"])
 def test_looking_only_when_it_may_matter_loses_nothing(policy, monkeypatch):
     """Compared with a query after every block, as in a modem."""
     ends = []
     for how in ("now and then", "every block"):
         if how == "every block":
-            monkeypatch.setattr("benchmarks.worlds.bursts._next_chance", lambda *given: given[-1])
+            monkeypatch.setattr("benchmarks.worlds.bursts.next_chance", lambda *given: given[-1])
         arrivals = small_messages(5, 15.0, 4.0, 11)
         sim = simulation(policy, arrivals, air=AirParams(snr_db=25.0), pdu_size=128, seed=11)
         sim.run(5.0)

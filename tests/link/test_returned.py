@@ -45,7 +45,7 @@ class Doorkeeper:
     pause_s = 0.0
     others_follow = False
     keeps_schedule = False
-    by_request = None
+    by_request = by_auction = None
 
     def slot(self, wish):
         return self.slots.pop(0)

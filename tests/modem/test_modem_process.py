@@ -18,7 +18,7 @@ from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem import make_modem
 from sdrlinkd.modem.clock import Seen
 from sdrlinkd.modem.process import life
-from sdrlinkd.modem.process.page import Page, Shown
+from sdrlinkd.modem.process.page import MOST_PULSES, Page, Shown
 from tests.laws import law
 from tests.modem.test_modem_link import Listener, bursts, config, send
 
@@ -49,13 +49,20 @@ def test_a_page_is_empty_until_there_is_a_block(page):
 
 
 @law(60)
-@given(st.integers(0, 1 << 62), TIMES, st.floats(-1e9, 1e9), TIMES, TIMES, st.none() | TIMES)
-def test_a_page_shows_what_was_written(end, host_s, late_s, until, idle_since, burst_at):
+@given(
+    st.integers(0, 1 << 62), TIMES, st.floats(-1e9, 1e9), TIMES, TIMES, st.none() | TIMES,
+    st.none() | TIMES, st.lists(TIMES, max_size=20),
+)  # fmt: skip
+def test_a_page_shows_what_was_written(
+    end, host_s, late_s, until, idle_since, burst_at, carrier_at, pulses
+):
     fd = make_page()
     writer, reader = Page(fd), Page(fd)
     os.close(fd)
-    shown = Shown(Seen(end, host_s, late_s), Sensed(until, idle_since, burst_at), end // 2)
-    writer.show(*shown)
+    sensed = Sensed(until, idle_since, burst_at, host_s, carrier_at, tuple(pulses))
+    writer.show(Seen(end, host_s, late_s), sensed, end // 2)
+    sensed = sensed._replace(pulses=sensed.pulses[-MOST_PULSES:])
+    shown = Shown(Seen(end, host_s, late_s), sensed, end // 2)
     assert reader.read() == shown
     writer.beat(until)
     reader.wakes = True

@@ -264,3 +264,30 @@ def test_a_true_burst_is_never_given_up_for_its_energy(snr_db):
         for now, sensed, _ in story:
             if QUIET + HEADER_WITHIN <= now < end - 2:
                 assert is_busy(sensed), (snr_db, seed, now)
+
+
+@pytest.mark.parametrize("size", [100, 500, 5000])
+def test_pulses_after_a_burst_are_told_apart_from_it(size):
+    burst, pulse = a_burst(3), phy.pulse()
+    begins, parts = [], [QUIET, burst]
+    for _ in range(3):
+        begins.append(sum(each if isinstance(each, int) else len(each) for each in parts) + QUIET)
+        parts += [QUIET, pulse]
+    samples = on_air(*parts, QUIET)
+    *_, (_, sensed, _) = listen(make_receiving(), samples, size)
+    burst_end = (QUIET + len(burst)) / RATE
+    assert sensed.carrier_end == pytest.approx(burst_end, abs=2 / RATE)
+    assert sensed.carrier_at == pytest.approx(QUIET / RATE, abs=2 / RATE)
+    found = [round(each * RATE) for each in sensed.pulses]
+    assert len(found) == 3
+    assert all(abs(a - b) < COARSE for a, b in zip(found, begins, strict=True))
+    assert sensed.idle_since * RATE == pytest.approx(begins[-1] + phy.N_PULSE, abs=COARSE)
+    assert sensed.burst_at is None, "the last energy was nobody's burst"
+
+
+def test_a_burst_after_pulses_ends_them():
+    samples = on_air(QUIET, phy.pulse(), QUIET, a_burst(4), QUIET)
+    *_, (_, sensed, _) = listen(make_receiving(), samples, 500)
+    assert sensed.pulses == ()
+    assert sensed.carrier_at == sensed.burst_at
+    assert sensed.carrier_end == sensed.idle_since

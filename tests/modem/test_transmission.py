@@ -194,3 +194,22 @@ async def test_what_has_a_deadline_keeps_its_start(late_by):
     (burst,), _ = await late_by(order, late=2000)
     assert (burst.start, burst.latest) == (500_000, 500_100)
     assert same_samples(burst, [STAMPED])
+
+
+@pytest.mark.parametrize("lockstep", [False, True])
+async def test_an_order_without_pdus_is_a_pulse(lockstep):
+    radio = Radio(lockstep)
+    sending = Transmission(ModemParams(), radio)
+    async with asyncio.TaskGroup() as tasks:
+        left = []
+        sending.start(tasks, left.append)
+        sending.send(BurstOrder(1, 1000, 1000, 0, 0, []))
+        await radio.arrivals.get()
+        burst, _ = radio.taken[0]
+        radio.tell(0, TxOutcome.SENT, 1000)
+    assert burst.start == 1000
+    assert np.abs(burst.samples) == pytest.approx(
+        np.abs(phy.pulse()) * np.abs(burst.samples).max(), abs=1e-3
+    )
+    assert [each.outcome for each in left] == [Outcome.SENT]
+    sending.close()

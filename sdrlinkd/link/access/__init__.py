@@ -4,8 +4,10 @@ This package holds the access policies, each a state machine over the link's clo
 that fits the radio. It never reads a message, and decides only when to send.
 """
 
+from sdrlinkd.link.access.auction import Auction
 from sdrlinkd.link.access.auto import Settled, may_share, percent, settle
 from sdrlinkd.link.access.base import Access, Slot, Wish
+from sdrlinkd.link.access.by_auction import ByAuction
 from sdrlinkd.link.access.by_request import ByRequest
 from sdrlinkd.link.access.choice import (
     CLOCK_ERROR_S,
@@ -15,6 +17,7 @@ from sdrlinkd.link.access.choice import (
     check_access,
     make_access,
 )
+from sdrlinkd.link.access.contest import Contest, n_bits
 from sdrlinkd.link.access.csma import STEPS as CSMA_STEPS
 from sdrlinkd.link.access.csma import WINDOWS as CSMA_WINDOWS
 from sdrlinkd.link.access.csma import Csma
@@ -46,7 +49,10 @@ __all__ = [
     "TDMA_STEPS",
     "Access",
     "AccessParams",
+    "Auction",
+    "ByAuction",
     "ByRequest",
+    "Contest",
     "Csma",
     "Due",
     "Free",
@@ -65,6 +71,7 @@ __all__ = [
     "idle_words",
     "make_access",
     "may_share",
+    "n_bits",
     "percent",
     "places_of",
     "plan",

@@ -18,7 +18,7 @@ FAIR = 0.5
 """A policy is refused if it carries less than this share of what the best policy carries."""
 
 
-Policy = Literal["auto", "none", "csma", "minislot", "tdma", "grant"]
+Policy = Literal["auto", "none", "csma", "minislot", "auction", "tdma", "grant"]
 
 
 class Settled(NamedTuple):

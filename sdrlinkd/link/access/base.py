@@ -4,6 +4,7 @@ import math
 from math import inf
 from typing import NamedTuple, Protocol, Self
 
+from sdrlinkd.link.access.by_auction import ByAuction
 from sdrlinkd.link.access.by_request import ByRequest
 from sdrlinkd.link.access.requests import Due, Waiting
 from sdrlinkd.link.access.sightings import Sightings
@@ -19,13 +20,15 @@ class Slot(NamedTuple):
     """A time slot: a burst may leave at `start` and must be over at `end`.
 
     A burst that misses `start` may still leave if it is over at `late_end`. After its first PDU,
-    the burst holds no PDU of a class less urgent than `least`.
+    the burst holds no PDU of a class less urgent than `least`. `is_pulse`: instead of a burst, a
+    pulse of energy leaves.
     """
 
     start: float
     end: float = inf
     late_end: float = inf
     least: Qos = Qos.BULK
+    is_pulse: bool = False
 
     @classmethod
     def exact(cls, start: float, end: float = inf, least: Qos = Qos.BULK) -> Self:
@@ -88,6 +91,10 @@ class Access(Protocol):
     def by_request(self) -> ByRequest | None:
         """The policy itself, if it gives turns by request."""
 
+    @property
+    def by_auction(self) -> ByAuction | None:
+        """The policy itself, if each burst tells what its robot wants next."""
+
     def mean_wait_s(self, qos: Qos) -> float:
         """Mean time in s from an idle channel to a burst of class `qos`."""
 
@@ -143,6 +150,11 @@ class BusyChannel:
     @property
     def by_request(self) -> ByRequest | None:
         """None, as nobody asks for turns."""
+        return None
+
+    @property
+    def by_auction(self) -> ByAuction | None:
+        """None, as bursts do not tell what comes next."""
         return None
 
     def __init__(self) -> None:

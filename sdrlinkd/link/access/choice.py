@@ -4,6 +4,7 @@ import math
 from random import Random
 
 from sdrlinkd.errors import ConfigError
+from sdrlinkd.link.access.auction import Auction
 from sdrlinkd.link.access.base import Access
 from sdrlinkd.link.access.csma import Csma
 from sdrlinkd.link.access.free import Free
@@ -35,7 +36,9 @@ LONGEST_APART_S = 0.1
 
 def check_access(params: AccessParams, own_id: int) -> None:
     """Check what can be checked without a radio. Raises ConfigError."""
-    if params.policy in ("minislot", "tdma", "grant") or (params.policy == "auto" and params.nodes):
+    if params.policy in ("minislot", "auction", "tdma", "grant") or (
+        params.policy == "auto" and params.nodes
+    ):
         if own_id not in params.nodes:
             raise ConfigError(
                 f"access.nodes: got {params.nodes}; allowed with access.policy = "
@@ -61,7 +64,7 @@ def make_access(
     _refuse_deaf(params, traits)
     detect_s = traits.detect_s + MARGIN_S
     apart_s = reaction_s(traits)
-    if params.policy in ("csma", "minislot") and apart_s > LONGEST_APART_S:
+    if params.policy in ("csma", "minislot", "auction") and apart_s > LONGEST_APART_S:
         raise ConfigError(
             f'access.policy: got "{params.policy}"; this radio detects other robots\' bursts '
             f"only after {apart_s * 1e3:.3g} ms; allowed: at most {LONGEST_APART_S * 1e3:g} ms: "
@@ -83,9 +86,25 @@ def make_access(
                 f"allowed: at most {LONGEST_ROUND_S:g} s: use tdma, or fewer robots"
             )
         return MiniSlots(own_id, params.nodes, minislot_s, detect_s)
+    if params.policy == "auction":
+        return _make_auction(params, own_id, traits)
     if params.policy == "grant":
         return _make_grant(params, own_id, traits, longest_burst_s, rng)
     return _make_tdma(params, own_id, traits, longest_burst_s, apart_s, rng)
+
+
+def _make_auction(params: AccessParams, own_id: int, traits: PduLinkTraits) -> Auction:
+    if not traits.pulse_s:
+        raise ConfigError(
+            f'access.policy: got "auction", but the backend "{traits.kind}" sends no pulses; '
+            'allowed: "auto" or "grant"'
+        )
+    # A pulse is known when it is over: two quiet windows after the one in which it ends.
+    detect_s = traits.pulse_s + 1.5 * traits.detect_s + MARGIN_S
+    least_s = traits.lead_s + traits.react_s + detect_s
+    minislot_s = params.minislot_s or least_s
+    _refuse_short("minislot_s", minislot_s, least_s, traits)
+    return Auction(own_id, params.nodes, minislot_s, detect_s)
 
 
 def make_free(traits: PduLinkTraits, is_alone: bool = False) -> Free:

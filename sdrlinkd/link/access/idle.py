@@ -28,6 +28,11 @@ def _why_idle(settled: Settled) -> str:
             f"minislot waits up to {1e3 * access.turn_s:.3g} ms after every burst on this radio "
             f"and leaves {percent(settled.share)} of the airtime usable"
         )
+    if settled.policy == "auction":
+        return (
+            f"auction needs {1e3 * access.pause_s:.3g} ms after every burst on this radio, and "
+            f"{1e3 * access.round_s:.3g} ms more for a contest"
+        )
     if settled.policy == "csma":
         waits = f"csma waits at least {1e3 * access.pause_s:.3g} ms after every burst"
         return f"{waits} on this radio and leaves {percent(settled.share)} of the airtime usable"

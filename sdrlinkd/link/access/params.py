@@ -11,7 +11,7 @@ Seconds = Annotated[float, Meta(ge=0, le=10)]
 class AccessParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How robots share the channel, the same at all robots; a time of 0 follows from the radio."""
 
-    policy: Literal["auto", "none", "csma", "minislot", "tdma", "grant"] = "auto"
+    policy: Literal["auto", "none", "csma", "minislot", "auction", "tdma", "grant"] = "auto"
     """Access policy; auto: none if `nodes` lists no other robot, minislot if the radio reacts fast
     enough, else tdma."""
     nodes: list[Annotated[int, Meta(ge=0, le=254)]] = []
@@ -26,7 +26,7 @@ class AccessParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     slottime_s: Seconds = 0.0
     """csma: slot time in s (SLOTTIME); it must be long enough to hear another robot's start."""
     minislot_s: Seconds = 0.0
-    """minislot, tdma: distance in s between the starts allowed to different robots."""
+    """minislot, auction, tdma: distance in s between the starts allowed to different robots."""
     slot_s: Seconds = 0.0
     """tdma: length of a robot's slot in s."""
     guard_s: Seconds = 0.0

@@ -15,18 +15,18 @@ message may wait between its fragments.
 
 from collections.abc import Sequence
 from random import Random
-from typing import NamedTuple
 
 from sdrlinkd.link.packing.bare_numbers import BareNumbers
-from sdrlinkd.link.packing.draft import BuiltPdu, Draft, EntryWriter
+from sdrlinkd.link.packing.draft import FLAGS, NO_DST, BuiltPdu, Draft, EntryWriter
 from sdrlinkd.link.packing.entry_ids import REST_FACTOR, TopicEntryIds
 from sdrlinkd.link.packing.flush import Flush
 from sdrlinkd.link.packing.head_of_line import HeadOfLine
 from sdrlinkd.link.packing.piggyback import PiggybackRecords
 from sdrlinkd.link.packing.record_pdus import RecordPdus
+from sdrlinkd.link.packing.report import ComposerReport
 from sdrlinkd.link.packing.single_entry import SingleEntry
 from sdrlinkd.link.params import LinkParams
-from sdrlinkd.link.qos import WIRE_BITS, Qos
+from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Lane, Level, Outbox, Outgoing, with_first
 from sdrlinkd.link.schedule import Allowance, ClassesParams
 from sdrlinkd.wire import (
@@ -37,7 +37,6 @@ from sdrlinkd.wire import (
     STAMP_SIZE,
     Record,
     equal_payload,
-    flags,
 )
 
 MAX_PDUS = 63
@@ -46,17 +45,6 @@ MAX_PDUS = 63
 MAX_LANES_PER_PDU = 4 * MAX_ENTRIES
 # With less room for another entry than this, a STAMP does not even fit after other records.
 MIN_ROOM_FOR_STAMP = STAMP_SIZE - ENTRY_HEADER_SIZE - 1
-FLAGS = {(qos, z): flags(WIRE_BITS[qos], z) for qos in Qos for z in (False, True)}
-"""A PDU's first octet, by (class, whether its messages are compressed)."""
-
-
-class ComposerReport(NamedTuple):
-    """Counts of what was composed since the start."""
-
-    entries: int
-    pdus: int
-    starved: list[int]
-    """Topic ids that had to wait for a free entry id."""
 
 
 class Composer:
@@ -79,9 +67,8 @@ class Composer:
         self.entry_ids = TopicEntryIds(rng, REST_FACTOR * reassembly_timeout_s)
         self.k_single = equal_payload(params.pdu_size, 1)
         """Payload bytes of a PDU with one entry."""
-        self._k_shared = min(
-            max(equal_payload(params.pdu_size, 2), params.min_fragment), self.k_single
-        )
+        self._least_shared = max(equal_payload(params.pdu_size, 2), params.min_fragment)
+        self._k_shared = min(self._least_shared, self.k_single)
         parity = {qos: classes.of(qos).parity * has_control for qos in Qos}
         self._writer = EntryWriter(outbox, self.entry_ids, self.k_single, self._k_shared, parity)
         self.asking = self._writer.asking
@@ -94,14 +81,23 @@ class Composer:
         self._bare = BareNumbers()
         self._record_pdus = RecordPdus(params.pdu_size, piggyback, self._bare, self._finish)
 
+    def leave_room(self, record: bytes) -> None:
+        """From now on, cut messages so that each PDU has room for such a record."""
+        draft = Draft(self._pdu_size)
+        if record:
+            draft.add_record(record)
+        self.k_single = draft.room
+        self._k_shared = min(self._least_shared, self.k_single)
+        self._writer.leave_room(self.k_single, self._k_shared)
+
     def fill(
         self, start: float, allowance: Allowance, source: int | None = None, *,
-        is_mixed: bool = False,
+        is_mixed: bool = False, told: bytes = b"",
     ) -> list[BuiltPdu]:  # fmt: skip
         """The PDUs of a burst whose preamble leaves at `start`; empty if there is nothing to send.
 
         Unless `is_mixed`, all PDUs have one source, `source` if given: receivers derive from it who
-        may send next.
+        may send next. The first one of ours has the record `told`.
         """
         built: list[BuiltPdu] = []
         outbox, most_of = self._outbox, allowance.most
@@ -125,14 +121,19 @@ class Composer:
             elif n >= most:
                 break
             several: Sequence[BuiltPdu] = ()
-            if first is None and levels[0].lanes[0].current is not None:
+            if first is None and not told and levels[0].lanes[0].current is not None:
                 several = self._next_full(
                     start, max(1, min(most, MAX_PDUS) - n - len(owed)), source
                 )
             if not several:
-                pdu = self._next_pdu(start, first, source)
+                pdu = self._next_pdu(start, first, source, told)
+                if pdu is None and told:
+                    # The next fragment was cut before there had to be room for a record.
+                    told = b""
+                    continue
                 if pdu is None:
                     break
+                told = b"" if pdu.src == self._src else told
                 several = (pdu,)
             built += several
         self._pdus += len(built)
@@ -159,14 +160,7 @@ class Composer:
             return float("inf")
         if self._flush.is_on and self._flush.must_wait(now):
             return self._flush.due_at()
-        return min(
-            self.entry_ids.next_free(head)
-            if lane.current is None or head.needs_id
-            else float("-inf")
-            for level in self._outbox.levels
-            for lane in level.lanes
-            if (head := lane.head) is not None
-        )
+        return self.entry_ids.next_free_of(self._outbox.levels)
 
     def take_asking(self) -> list[Outgoing]:
         """The messages in `asking`, which is then emptied."""
@@ -201,7 +195,7 @@ class Composer:
         self._flush.end()
 
     def _next_pdu(
-        self, start: float, first: Qos | None = None, source: int | None = None
+        self, start: float, first: Qos | None, source: int | None, told: bytes
     ) -> BuiltPdu | None:
         """The next PDU of a burst whose preamble leaves at `start`, or None.
 
@@ -214,10 +208,13 @@ class Composer:
             return None
         may_be_own = source is None or source == self._src
         draft = Draft(self._pdu_size)
+        if told:
+            draft.add_record(told)
         looked_at = 0
         order = levels if first is None else with_first(levels, first)
         for level in tuple(order):
-            if outbox.relays and draft.is_empty and (whole := self._next_whole(level, start)):
+            may_relay = outbox.relays and draft.dst == NO_DST
+            if may_relay and (whole := self._next_whole(level, start)):
                 if source in (None, whole.src):
                     return self._single_entry.relayed(whole, start)
                 return None
@@ -226,9 +223,9 @@ class Composer:
             looked_at += len(level.lanes)
             if draft.room >= self._k_shared or self._writer.may_fit(level, draft.room):
                 self._fill_from(level, draft, start)
-            if draft.room <= 0 or (looked_at > MAX_LANES_PER_PDU and not draft.is_empty):
+            if draft.room <= 0 or (looked_at > MAX_LANES_PER_PDU and draft.dst != NO_DST):
                 break
-        if draft.is_empty:
+        if draft.dst == NO_DST:
             return None
         if draft.room >= MIN_ROOM_FOR_STAMP:
             for message in draft.carried:

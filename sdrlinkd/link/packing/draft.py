@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from sdrlinkd.link.packing.entry_ids import TopicEntryIds
 from sdrlinkd.link.packing.parity import parity_records
-from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.qos import WIRE_BITS, Qos
 from sdrlinkd.link.queue import Lane, Level, Outbox, Outgoing
 from sdrlinkd.wire import (
     ASKING_STAMP_SIZE,
@@ -14,11 +14,14 @@ from sdrlinkd.wire import (
     PART_PARITY,
     PARTS,
     PduBuilder,
+    flags,
     fragment_count,
     octet,
 )
 
 NO_DST = -1
+FLAGS = {(qos, z): flags(WIRE_BITS[qos], z) for qos in Qos for z in (False, True)}
+"""A PDU's first octet, by (class, whether its messages are compressed)."""
 
 
 class BuiltPdu(NamedTuple):
@@ -35,7 +38,10 @@ class BuiltPdu(NamedTuple):
 
 
 class Draft(PduBuilder):
-    """A PDU being filled, with the common properties of its entries and their messages."""
+    """A PDU being filled, with the common properties of its entries and their messages.
+
+    `dst` is NO_DST until it holds something of a message: an entry, a STAMP, or parity.
+    """
 
     __slots__ = ("carried", "dst", "is_compressed", "qos")
 
@@ -89,6 +95,10 @@ class EntryWriter:
         self.asking: list[Outgoing] = []
         """Messages just stamped whose producers want receipts."""
 
+    def leave_room(self, k_single: int, k_shared: int) -> None:
+        """Cut messages that begin from now on into fragments of these sizes."""
+        self._k_single, self._k_shared = k_single, k_shared
+
     def may_fit(self, level: Level, room: int) -> bool:
         """Whether the next entry of any lane may fit; a quick no saves trying each lane.
 
@@ -115,7 +125,7 @@ class EntryWriter:
         beside = head.overhead
         if needs_stamp and length + beside + bool(head.receipt) > draft.room_beside_stamp:
             # Send the age ahead in its own PDU only if both do not fit even into an empty one.
-            return draft.is_empty and self._send_stamp_ahead(lane, head, k, draft, start)
+            return draft.dst == NO_DST and self._send_stamp_ahead(lane, head, k, draft, start)
         if length + beside > draft.room or not self._has_begun(lane, head, k, start):
             return False
         draft.take(head, head.body if length == size else head.body[at : at + length])

@@ -4,7 +4,7 @@ from collections import Counter, deque
 from collections.abc import Iterable
 from random import Random
 
-from sdrlinkd.link.queue import Outgoing
+from sdrlinkd.link.queue import Level, Outgoing
 
 # A receiver may hear the last fragment late (reordering, relays), so an id rests a little longer
 # than the receiver waits for missing fragments.
@@ -128,6 +128,15 @@ class TopicEntryIds:
             return float("-inf")
         ids = self._by_topic.get(message.channel) or self._new(message.channel)
         return ids.next_free()
+
+    def next_free_of(self, levels: Iterable[Level]) -> float:
+        """Time at which a message of any level may begin or go on; −inf: now."""
+        return min(
+            self.next_free(head) if lane.current is None or head.needs_id else float("-inf")
+            for level in levels
+            for lane in level.lanes
+            if (head := lane.head) is not None
+        )
 
     def _new(self, topic_id: int) -> EntryIds:
         ids = self._by_topic[topic_id] = EntryIds(self._rng, self._rest_s)

@@ -21,6 +21,7 @@ from sdrlinkd.wire import (
     RegistryDigest,
     Stamp,
     TopicPiece,
+    Want,
     Wanted,
 )
 
@@ -78,6 +79,15 @@ class HeardRecords:
                 if isinstance(record, LinkReport):
                     record = _plausible(record, neighbor.mean_snr_db)
                 events.append(RecordHeard(src, record, at))
+
+    def take_wants(
+        self, src: int, admitted: Admitted, records: Iterable[Record], events: list[Event]
+    ) -> None:
+        """Take what robot `src` wants from a PDU to another robot: it concerns all who share the
+        air.
+        """
+        wants = (each for each in records if isinstance(each, Want) and admitted.is_proven)
+        events += (RecordHeard(src, want, admitted.at) for want in wants)
 
 
 def _plausible(report: LinkReport, snr_db: float | None) -> LinkReport:

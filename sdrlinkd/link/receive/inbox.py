@@ -150,6 +150,8 @@ class Inbox:
             if is_relay and not is_ours:
                 return self._drop("rx_relayed", events)
         if not is_ours:
+            if not is_relayed:
+                self._records.take_wants(pdu.src, admitted, records, events)
             return self._drop("rx_not_for_us", events)
         for record in records:
             if isinstance(record, Beacon | Clock):

@@ -47,6 +47,11 @@ class Allowance(NamedTuple):
         """This allowance, less `n` PDUs."""
         return self._replace(most=tuple(max(0, each - n) for each in self.most))
 
+    def at_least_one(self, classes: Collection[Qos]) -> "Allowance":
+        """This allowance, with at least one PDU for each of these classes."""
+        most = (max(n, qos in classes) for qos, n in zip(Qos, self.most, strict=True))
+        return self._replace(most=tuple(most))
+
     def least(self, least: Qos) -> "Allowance":
         """This allowance, except that classes less urgent than `least` may only start a burst."""
         most = (n if qos <= least else min(n, 1) for qos, n in zip(Qos, self.most, strict=True))

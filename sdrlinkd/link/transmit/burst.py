@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from enum import Enum
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outgoing
@@ -45,6 +45,18 @@ class Burst(NamedTuple):
     """When it was to leave at last; times inside are those of then."""
     repeated: RepeatGroup | None = None
     """The PDUs inside that are repeated, if this is why the burst leaves."""
+
+    @classmethod
+    def of_pulse(cls, start: float, length_s: float, qos: Qos, number: int) -> Self:
+        """A pulse of energy, without PDUs, for something of class `qos`."""
+        return cls(
+            [], [], [], 0, qos, start, start, length_s, number, first_start=start, ready_at=start
+        )
+
+    @property
+    def is_pulse(self) -> bool:
+        """Whether it is a pulse of energy, without PDUs."""
+        return not self.pdus
 
     def numbered(self) -> Iterator[tuple[bytes, int]]:
         """(octets, PDU number) of each PDU with messages, as far as the number is known."""

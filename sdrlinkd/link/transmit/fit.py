@@ -29,6 +29,8 @@ class Fit(NamedTuple):
     """Largest error of the times at which bursts left and came."""
     slower: tuple[int, ...]
     """By MCS, that with which its PDUs are repeated."""
+    pulse_s: float
+    """Length of a pulse of energy."""
     is_lockstep: bool
     """Whether the radio runs in lock-step; the link's time then starts with the radio."""
 
@@ -53,5 +55,6 @@ def fit_to(
         traits.ahead_s if traits.is_lockstep else NOTICE_S,
         traits.stamp_s,
         traits.slower,
+        traits.pulse_s,
         traits.is_lockstep,
     )

@@ -21,6 +21,7 @@ class Overheard:
         self._knows = knows
         self._access, self._rate = fit.settled.access, fit.rate
         self._by_request = fit.settled.access.by_request
+        self._by_auction = fit.settled.access.by_auction
         self._forecasts = forecasts
         self._own_id = own_id
         self._has_control = has_control
@@ -69,6 +70,8 @@ class Overheard:
             self._access.beacon(src, at)
         elif isinstance(record, Frame):
             self._access.take_frame(src, record, at)
+        elif self._by_auction is not None and isinstance(record, Want):
+            self._by_auction.take_want(record, at)
         elif self._by_request is None:
             return
         elif isinstance(record, Grant):

@@ -24,6 +24,7 @@ from sdrlinkd.link.receive import PduHeard
 from sdrlinkd.link.repeat import Answers
 from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
 from sdrlinkd.link.traits import Opportunity
+from sdrlinkd.link.transmit.bids import ROOM, Bid, Bids
 from sdrlinkd.link.transmit.burst import Burst, Outcome
 from sdrlinkd.link.transmit.control_records import ControlRecords
 from sdrlinkd.link.transmit.fit import Fit
@@ -116,6 +117,12 @@ class BurstScheduler:
             by_request, fit, self._outbox, self._composer, self._control_records, self._piggyback,
             self._forecasts, self._answers, self._own_id,
         )  # fmt: skip
+        by_auction = self._access.by_auction
+        self._bids = None if by_auction is None else Bids(
+            by_auction, self._outbox, self._composer, self._own_id
+        )  # fmt: skip
+        self._composer.leave_room(b"" if by_auction is None else ROOM)
+        self._pulse_s = fit.pulse_s
         self._overheard = Overheard(
             fit, self._forecasts, self._own_id, self._has_control, self._knows
         )
@@ -155,10 +162,14 @@ class BurstScheduler:
         if turns is not None:
             waiting = turns.waiting(earliest, partial(airtime_s, mcs))
             dues = turns.dues(earliest, partial(airtime_s, mcs))
+        elif self._bids is not None:
+            waiting = self._bids.waiting(earliest)
         slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed, waiting, dues))
         if slot is None:
             return None
         start = slot.start
+        if slot.is_pulse:
+            return self._pulse(start, qos)
         sealing = self._sealing
         if sealing.is_on and not self._may_seal(start, MAX_PDUS):
             return None
@@ -169,13 +180,15 @@ class BurstScheduler:
         # A schedule's phase is valid only for the planned start.
         is_timed = frame is not None and records.tells_schedule(start)
         cannot_wait = records.collect(start, frame, rate)
-        first_number = composer.next_number
+        first_number, bid = composer.next_number, None
         if turns is not None:
             built, n_records = turns.fill(
                 slot, allowance, partial(airtime_s, mcs), waiting, cannot_wait=cannot_wait
             )
         else:
-            built, n_records = self._fill(start, allowance, cannot_wait)
+            if self._bids is not None:
+                bid = self._bids.after(allowance, partial(airtime_s, mcs))
+            built, n_records = self._fill(start, allowance, cannot_wait, bid)
         if not built:
             if head is not None and allowance.until < inf:
                 since = min(self._held.since, start)
@@ -205,6 +218,8 @@ class BurstScheduler:
             ours = accumulate(pdu.src == self._own_id for pdu in built)
             numbers = [first_number + n - 1 for n in ours]
         inner: list[bytes] = []
+        if self._bids is not None and bid is not None:
+            self._bids.told(bid, start, built)
         if sealing.is_on:
             pdus, inner = self._sealed(pdus, start)
         access.sent(start + length_s, self._relayed_src(pdus))
@@ -236,6 +251,11 @@ class BurstScheduler:
         is_sent = outcome is Outcome.SENT
         if not is_sent:
             self._access.not_sent(burst.start)
+        if burst.is_pulse:
+            used_s = burst.airtime_s * is_sent
+            self.airtime_s += used_s
+            self._control_airtime_s += used_s
+            return
         is_late, repeated = outcome is Outcome.LATE, burst.repeated
         if is_late and repeated is None and self._retry.give_back(burst, now):
             self._entry_ids.not_left(chain.from_iterable(burst.carried))
@@ -352,6 +372,8 @@ class BurstScheduler:
         )
         if slot is None or slot.start + airtime_s > slot.end:
             return None
+        if slot.is_pulse:
+            return self._pulse(slot.start, again.qos)
         burst = self._retry.take(slot.start)
         self._access.sent(slot.start + airtime_s, self._relayed_src(burst.pdus))
         self._entry_ids.left(chain.from_iterable(burst.carried), slot.start)
@@ -366,6 +388,8 @@ class BurstScheduler:
         if planned is None:
             return None
         slot = planned.slot
+        if slot.is_pulse:
+            return self._pulse(slot.start, qos)
         if self._sealing.is_on and not self._may_seal(slot.start, 1):
             return None
         most = self._allowance(slot, planned.mcs, opportunity, qos).most[qos]
@@ -379,6 +403,11 @@ class BurstScheduler:
         self._number += 1
         return burst._replace(number=self._number)
 
+    def _pulse(self, start: float, qos: Qos) -> Burst:
+        """A pulse of energy, by which the access policy tells that we have something to send."""
+        self._number += 1
+        return Burst.of_pulse(start, self._pulse_s, qos, self._number)
+
     def _may_seal(self, start: float, n: int) -> bool:
         """Whether there are numbers for `n` PDUs of ours in a burst at `start`."""
         if self._sealing.may_send(start, self._composer.next_number & 0xFF, n):
@@ -387,24 +416,27 @@ class BurstScheduler:
         return False
 
     def _fill(
-        self, start: float, allowance: Allowance, cannot_wait: bool
+        self, start: float, allowance: Allowance, cannot_wait: bool, bid: Bid | None
     ) -> tuple[list[BuiltPdu], int]:
-        """(PDUs, how many of them hold only records) of a burst at `start`.
+        """(PDUs, how many of them hold only records) of a burst at `start`, which tells `bid`.
 
         A record that is due uses spare room. It gets its own PDU if traffic leaves no room for too
         long, or if there is no traffic.
         """
         composer, records = self._composer, self._control_records
+        told = b"" if bid is None else bid.octets
         may_tell = allowance.most[Qos.DEFAULT] > 0
         if cannot_wait and may_tell:
             # Records come after more urgent classes. Only our own PDUs may precede them: clocks
             # cannot wait until all relayed PDUs are sent, and a burst has only one source.
-            built = composer.fill(start, allowance.above(Qos.DEFAULT), self._own_id)
+            built = composer.fill(start, allowance.above(Qos.DEFAULT), self._own_id, told=told)
         else:
-            built = composer.fill(start, allowance)
-            if built or not may_tell or not records.is_due(start):
+            built = composer.fill(start, allowance, told=told)
+            # With a bid, the others wait for a burst, even if nothing is left to tell.
+            if built or not may_tell or not (bid is not None or records.is_due(start)):
                 return built, 0
-        alone = composer.fill_with_records(start)
+        first = [] if bid is None or built else [bid.record]
+        alone = composer.fill_with_records(start, first)
         key = records.clear_key(start) if len(built) + len(alone) < MAX_PDUS else None
         if key is not None:
             alone.append(key)
@@ -443,6 +475,9 @@ class BurstScheduler:
                 access.others_follow,
                 asked,
             )
+        if self._bids is not None:
+            # The others have left the air to us, and wait for a burst.
+            allowance = allowance.at_least_one(asked)
         if slot.least < Qos.BULK:
             allowance = allowance.least(slot.least)
         if not self._shares.is_owed or one_s > longest_s:

@@ -13,10 +13,11 @@ from typing import NamedTuple
 from sdrlinkd.link import Sensed
 from sdrlinkd.modem.clock import Seen
 
-_RECORD = struct.Struct("<qdddddq")
+MOST_PULSES = 16
+_RECORD = struct.Struct(f"<qdddddddq{MOST_PULSES}d")
 _CRC = struct.Struct("<I")
 _SIZE = _RECORD.size + _CRC.size
-_BEAT, _WAKES = 256, 264
+_BEAT, _WAKES = 512, 520
 _TIME = struct.Struct("<d")
 _NOWHERE = float("nan")
 TRIES = 100
@@ -40,8 +41,10 @@ class Page:
 
     def show(self, seen: Seen, sensed: Sensed, n_samples: int) -> None:
         """Write the last block, the state of the channel, and how many samples were received."""
-        burst_at = _NOWHERE if sensed.burst_at is None else sensed.burst_at
-        record = _RECORD.pack(*seen, sensed.until, sensed.idle_since, burst_at, n_samples)
+        until, idle_since, burst_at, carrier_end, carrier_at, pulses = sensed
+        times = (until, idle_since, _told(burst_at), carrier_end, _told(carrier_at))
+        padded = (*pulses[-MOST_PULSES:], *[_NOWHERE] * (MOST_PULSES - len(pulses)))
+        record = _RECORD.pack(*seen, *times, n_samples, *padded)
         self._memory[:_SIZE] = record + _CRC.pack(zlib.crc32(record))
 
     def read(self) -> Shown | None:
@@ -50,9 +53,7 @@ class Page:
             data = self._memory[:_SIZE]
             record = data[: _RECORD.size]
             if zlib.crc32(record) == _CRC.unpack_from(data, _RECORD.size)[0]:
-                end, host_s, late_s, until, idle_since, burst_at, n = _RECORD.unpack(record)
-                at = None if burst_at != burst_at else burst_at
-                self._last = Shown(Seen(end, host_s, late_s), Sensed(until, idle_since, at), n)
+                self._last = _shown(record)
                 break
             if not any(data):
                 break
@@ -80,3 +81,24 @@ class Page:
     def close(self) -> None:
         """Free the page."""
         self._memory.close()
+
+
+def _shown(record: bytes) -> Shown:
+    end, host_s, late_s, until, idle_since, burst_at, carrier_end, carrier_at, n, *pulses = (
+        _RECORD.unpack(record)
+    )
+    sensed = Sensed(
+        until, idle_since, _at(burst_at), carrier_end, _at(carrier_at),
+        tuple(each for each in pulses if each == each),
+    )  # fmt: skip
+    return Shown(Seen(end, host_s, late_s), sensed, n)
+
+
+def _told(at: float | None) -> float:
+    """A time as it is written."""
+    return _NOWHERE if at is None else at
+
+
+def _at(told: float) -> float | None:
+    """A time as it was written; NaN differs from itself."""
+    return None if told != told else told

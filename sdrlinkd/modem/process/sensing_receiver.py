@@ -54,8 +54,17 @@ class SensingReceiver:
         return self._receiver.next_index
 
     def _sense_air(self, sense: "phy.EnergyDetector") -> Sensed:
-        rate = self._rate_hz
-        until, energy_end = sense.next_index, sense.busy_until
+        sensed = self._sense_energy(sense, sense.busy_until)
+        if sense.carrier_until == sense.busy_until:
+            end, at = sensed.idle_since, sensed.burst_at
+        else:
+            _, end, at, *_ = self._sense_energy(sense, sense.carrier_until)
+        pulses = tuple(each / self._rate_hz for each in sense.pulses if each / self._rate_hz > end)
+        return sensed._replace(carrier_end=end, carrier_at=at, pulses=pulses)
+
+    def _sense_energy(self, sense: "phy.EnergyDetector", energy_end: int) -> Sensed:
+        """The state of the channel if energy was detected until `energy_end`."""
+        rate, until = self._rate_hz, sense.next_index
         begin, end, snr_db = self._receiver.claim
         burst_at: float | None = begin / rate
         if energy_end + VANISHED <= until and energy_end > begin + TAIL:

@@ -6,6 +6,8 @@ from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
+import numpy as np
+
 import phy
 from backends import GAP, BackendError, Radio, Samples, TxBurst, TxOutcome, TxReport
 from sdrlinkd.config import ModemParams
@@ -87,7 +89,7 @@ class Transmission:
             asyncio.get_running_loop().call_soon(self._end, told)
             return
         # A short burst must not overtake one that the thread still modulates.
-        n = phy.layout(self._grid, order.mcs, len(order.pdus), len(order.pdus[0])).n_samples
+        n = self._samples(order)
         if self._at_once or (n <= SHORT and not self._in_thread):
             made = self._made(order, n)
             answer = self._hand_over(made)
@@ -194,8 +196,16 @@ class Transmission:
             self._pending.remove(told.number)
             self._left(told)
 
+    def _samples(self, order: BurstOrder) -> int:
+        """Length of a burst in samples; without PDUs, it is a pulse."""
+        if not order.pdus:
+            return phy.N_PULSE
+        return phy.layout(self._grid, order.mcs, len(order.pdus), len(order.pdus[0])).n_samples
+
     def _modulate(self, order: BurstOrder) -> _Modulated:
         """The samples of a burst, scaled to leave room for its peaks."""
+        if not order.pdus:
+            return _Modulated(order, phy.pulse() * np.float32(self._amplitude), 0.0)
         began = time.perf_counter()
         samples: Samples = self._transmitter.modulate(order.pdus, order.mcs) * self._amplitude
         took_s = time.perf_counter() - began

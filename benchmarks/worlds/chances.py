@@ -1,0 +1,55 @@
+"""When a simulated robot looks again whether it may send."""
+
+from benchmarks.worlds.burst_channel import AirSense
+from benchmarks.worlds.station import Station
+from sdrlinkd.link import AccessParams, Sensed
+
+INFINITE = float("inf")
+
+
+def at_pace(sensed: AirSense, pace: float) -> Sensed:
+    """What a receiver knows, in the time of its robot."""
+    until, idle_since, burst_at, carrier_end, carrier_at, pulses = sensed
+    return Sensed(
+        until * pace,
+        idle_since * pace,
+        None if burst_at is None else burst_at * pace,
+        carrier_end * pace,
+        None if carrier_at is None else carrier_at * pace,
+        tuple(each * pace for each in pulses),
+    )
+
+
+def next_chance(
+    station: Station, name: str, access: AccessParams, sensed: Sensed, t: float
+) -> float:
+    """Earliest time after `t` at which the link can decide differently, if nothing new arrives.
+
+    All times are by the station's clock. In tdma that is its own slot. With reuse it is also the
+    slots before that, at its mini-slots after their start or after the end of a burst in them.
+    """
+    policy, traits = station.settled.access, station.traits
+    if policy.by_request is not None:
+        return max(t, policy.by_request.turn_at(t + traits.lead_s) - traits.lead_s - traits.react_s)
+    frame = policy.frame(t + traits.lead_s)
+    carrier_end = -INFINITE if sensed.burst_at is None else sensed.idle_since
+    if name == "auction":
+        return max(t, sensed.carrier_end, station.free_at - traits.lead_s)
+    if name in ("csma", "minislot"):
+        return max(t, carrier_end, station.free_at - traits.gap_s)
+    if frame is None:
+        return t
+    n, phase_s = len(access.nodes), 1e-6 * frame.phase_us
+    rank, slot_s = access.nodes.index(station.link.own_id), policy.round_s / n
+    minislot_s = access.minislot_s or traits.lead_s + traits.react_s + traits.detect_s
+    first = int(phase_s / slot_s)
+    begin = t + traits.lead_s - phase_s + first * slot_s
+    turns = (rank - first) % n
+    own = begin + turns * slot_s - traits.lead_s - traits.react_s - traits.ahead_s
+    for turn in range(turns, 0, -1):
+        look = max(begin - minislot_s, carrier_end) + turn * minislot_s
+        begin += slot_s
+        soonest = max(t + traits.lead_s, look + minislot_s)
+        if access.reuse and soonest + station.least_s < begin:
+            return max(t, min(look, own))
+    return max(t, own)

@@ -1,0 +1,250 @@
+"""`auction`: the most urgent message of all robots that hear each other goes next.
+
+Each burst tells what its sender wants next (WANT). So after a burst, all know who is next. The
+first mini-slot is for a challenge: a pulse of energy, by whoever has something more urgent than
+what is known. If nobody challenges, the robot that is next sends in the second mini-slot. After a
+challenge, those that challenged find out by pulses who of them is first (`contest`). So a quiet
+hand-over takes two mini-slots, whatever the number of robots.
+
+All that is decided follows from when the last burst ended, what was told until then, and which
+pulses came since. If nothing comes, a new round begins, in which everybody may challenge.
+"""
+
+from collections.abc import Sequence
+from math import inf
+
+from sdrlinkd.link.access.base import NEVER, BusyChannel, Slot, Wish
+from sdrlinkd.link.access.by_auction import ByAuction
+from sdrlinkd.link.access.contest import Contest, n_bits
+from sdrlinkd.link.access.known_wants import KnownWants
+from sdrlinkd.link.access.mini_rounds import DRIFT, QUIET, ROUNDING_S, MiniRounds, Place, is_near
+from sdrlinkd.link.access.requests import Waiting, waiting_of
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.traits import Sensed
+from sdrlinkd.wire import Want
+
+PATIENCE = 8
+"""Bursts of others after which a robot that could not tell what it wants challenges, and wins
+against those that have not waited for so long."""
+FRUITLESS = 2
+"""Rounds with pulses and without a burst from which the pulses count as interference."""
+DISTURBED_S = 1.0
+"""Time in s for which pulses are not used after interference."""
+PAUSE_S = 0.05
+"""Time in s without a query after which a robot had nothing to send meanwhile."""
+
+
+class Auction(BusyChannel):
+    """Access by known requests, challenges and contests, among robots that all hear each other.
+
+    A mini-slot lasts `minislot_s`; a pulse is known `detect_s` after it began, less the reaction
+    time of the radio.
+    """
+
+    others_follow = True
+
+    def __init__(
+        self, own_id: int, nodes: Sequence[int], minislot_s: float, detect_s: float
+    ) -> None:
+        super().__init__()
+        self._own_id = own_id
+        self._nodes = list(nodes)
+        self._rank = self._nodes.index(own_id)
+        self._minislot_s = minislot_s
+        self._detect_s = detect_s
+        self._n_bits = n_bits(len(nodes))
+        self.pause_s = QUIET * minislot_s
+        self.round_s = (QUIET + self._n_bits) * minislot_s
+        self._wants = KnownWants(nodes)
+        self._told_at = NEVER
+        """When the last burst of another robot began that told what it wants."""
+        self._looked_at = -inf
+        """The end of the last burst of others that we have looked at."""
+        self._rounds = MiniRounds(minislot_s, self._n_bits)
+        self._pulses: list[float] = []
+        """When our last pulses began."""
+        self._contest: tuple[float, Contest] | None = None
+        """Our part in a contest, and the begin of its round."""
+        self._fruitless = 0
+        self._disturbed_until = -inf
+        self._is_disturbed = False
+        self._asked = 0, 0.0
+        """Since when we want to send, as (count of bursts then, time of the last query)."""
+
+    @property
+    def by_auction(self) -> ByAuction:
+        """This policy."""
+        return self
+
+    @property
+    def state(self) -> str:
+        """Policy, robots and times, for people."""
+        text = (
+            f"auction: {len(self._nodes)} robots, mini-slots of {self._minislot_s * 1e3:.3g} ms, "
+            f"contest in {self.round_s * 1e3:.3g} ms"
+        )
+        if self._is_disturbed:
+            text += "; turns without pulses, as something disturbs them"
+        return text
+
+    def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # the same for all classes
+        """Mean wait in s: a quiet hand-over."""
+        return self.pause_s
+
+    def carries(self, burst_s: float) -> float:
+        """Share of airtime of bursts after quiet hand-overs."""
+        return burst_s / (burst_s + self.pause_s)
+
+    def slot(self, wish: Wish) -> Slot | None:
+        """The next mini-slot for a burst or pulse of ours, once all before it are known."""
+        earliest, sensed = wish.earliest, wish.sensed
+        carrier_end = max(sensed.carrier_end, self.own_end)
+        if max(carrier_end, sensed.idle_since) > sensed.until:
+            return None
+        self._look(sensed)
+        if earliest > self._asked[1] + PAUSE_S:
+            self._asked = self._wants.n_bursts, earliest
+        self._asked = self._asked[0], earliest
+        self._is_disturbed = earliest < self._disturbed_until
+        if self._is_disturbed:
+            return self._in_turn(wish, carrier_end)
+        rounds = self._rounds
+        place = rounds.place(carrier_end, earliest, (*sensed.pulses, *self._pulses))
+        drift_s = (place.width_s - self._minislot_s) / 2
+        if place.start > sensed.until + place.width_s - drift_s - self._detect_s:
+            return None
+        if rounds.go_on(place, carrier_end):
+            self._nobody_came(place.begin)
+        self._count_fruitless(place)
+        if place.number == 0:
+            return self._challenge(wish, place)
+        if not place.is_contested:
+            first = self._wants.first(earliest)
+            is_next = first is not None and first.node == self._own_id
+            if place.is_first and is_next and not self._wants.is_unsure(self._own_id, earliest):
+                return self._burst(wish, place.start)
+            return None
+        return self._in_contest(wish, place, sensed.pulses)
+
+    def told(self, waiting: Waiting | None, start: float) -> None:
+        """Note what our burst at `start` tells; None: that we want nothing more."""
+        self._wants.told(self._own_id, waiting, start)
+
+    def take_want(self, want: Want, at: float) -> None:
+        """Take what a robot told in a burst at `at`."""
+        self._wants.told(want.node, waiting_of(want), at)
+        self._told_at = max(self._told_at, at)
+
+    def sent(self, end: float, src: int | None) -> None:
+        """Remember our own burst, which we do not hear."""
+        super().sent(end, src)
+        self._wants.on_air(self._own_id, end)
+        self._contest, self._fruitless = None, 0
+        self._asked = self._wants.n_bursts, end
+
+    def not_sent(self, start: float) -> None:
+        """Take no part in a contest of which a pulse of ours did not leave."""
+        if start in self._pulses:
+            self._pulses.remove(start)
+            self._contest = None
+        else:
+            super().not_sent(start)
+            self._wants.told(self._own_id, None, start)
+
+    def heard(self, src: int, at: float, is_relayed: bool) -> None:
+        """Remember who was on the air."""
+        if not is_relayed:
+            self._wants.on_air(src, at)
+
+    def _look(self, sensed: Sensed) -> None:
+        """Note what has ended since the last time: a burst that told something, or not."""
+        end = sensed.carrier_end
+        if end <= self._looked_at:
+            return
+        self._looked_at, self._fruitless = end, 0
+        if sensed.carrier_at != self._told_at:
+            self._wants.missed(end)
+
+    def _count_fruitless(self, place: Place) -> None:
+        self._fruitless += place.fruitless
+        if self._fruitless >= FRUITLESS:
+            self._disturbed_until, self._fruitless = place.start + DISTURBED_S, 0
+
+    def _nobody_came(self, now: float) -> None:
+        """Forget what the robot wants that was to send next, as it did not.
+
+        If we have missed a burst, that may be what we want.
+        """
+        wants = self._wants
+        first = wants.first(now)
+        if wants.is_unsure(self._own_id, now):
+            wants.told(self._own_id, None, now)
+        elif first is not None:
+            wants.told(first.node, None, now)
+
+    def _challenge(self, wish: Wish, place: Place) -> Slot | None:
+        """A pulse in the first mini-slot of a round, if we have reason for it."""
+        if not self._challenges(wish, place):
+            return None
+        n, has_waited = len(self._nodes), self._has_waited
+        contest = Contest(wish.qos, self._rank, n, has_waited=has_waited)
+        self._contest = place.begin, contest
+        return self._pulse(place.start)
+
+    def _challenges(self, wish: Wish, place: Place) -> bool:
+        now, wants = wish.earliest, self._wants
+        priority = 0 if wish.waiting is None else wish.waiting.priority
+        first = wants.first(now) if place.is_first else None
+        if first is not None and first.node == self._own_id:
+            return wants.is_unsure(self._own_id, now)
+        if first is None or not first.is_before(wish.qos, priority):
+            return True
+        is_unknown = wants.of(self._own_id, now) is None
+        return wish.qos <= first.qos and is_unknown and self._has_waited
+
+    def _in_contest(self, wish: Wish, place: Place, pulses: Sequence[float]) -> Slot | None:
+        """What we do in a round with a challenge."""
+        if self._contest is None or abs(self._contest[0] - place.begin) > place.width_s / 2:
+            return None
+        contest = self._contest[1]
+        for bit in range(place.number - 1):
+            if is_near(place.at(1 + bit), place.width_s, pulses):
+                contest.heard(bit)
+        if place.number <= self._n_bits:
+            return self._pulse(place.start) if contest.pulses(place.number - 1) else None
+        if not contest.is_in:
+            return None
+        return self._burst(wish, place.start)
+
+    @property
+    def _has_waited(self) -> bool:
+        return self._wants.n_bursts >= self._asked[0] + PATIENCE
+
+    def _burst(self, wish: Wish, start: float) -> Slot:
+        # What comes with the first message is not less urgent, or others should have the air.
+        return Slot.exact(start, least=max(Qos.LATENCY, wish.qos))
+
+    def _pulse(self, start: float) -> Slot | None:
+        if start in self._pulses:
+            return None
+        self._pulses = [*self._pulses[-self._n_bits :], start]
+        return Slot.exact(start)._replace(is_pulse=True)
+
+    def _in_turn(self, wish: Wish, idle_since: float) -> Slot | None:
+        """Without pulses: a mini-slot for each robot, in the order in which they were silent."""
+        sensed, n = wish.sensed, len(self._nodes)
+        idle_since = max(idle_since, sensed.idle_since)
+        if idle_since > sensed.until:
+            return None
+        begin, number = self._minislot_s, self._wants.in_order().index(self._own_id)
+        if self._wants.is_unsure(self._own_id, wish.earliest):
+            number = n + self._rank
+        while True:
+            width_s = self._minislot_s + 2 * DRIFT * begin
+            start = idle_since + begin + number * width_s
+            if start >= wish.earliest - ROUNDING_S:
+                break
+            begin += 2 * n * width_s
+        if start > sensed.until + width_s - DRIFT * begin - self._detect_s:
+            return None
+        return self._burst(wish, max(start, wish.earliest))

@@ -1,0 +1,96 @@
+"""What each robot has told that it wants, and when each of them was last on the air."""
+
+from collections.abc import Iterable
+from math import inf
+from typing import NamedTuple
+
+from sdrlinkd.link.access.requests import Waiting
+from sdrlinkd.link.qos import Qos
+
+WANTED_S = 1.0
+"""Time in s for which what a robot has told counts."""
+HERE_S = 3.5
+"""Time in s after which a robot that was not heard is gone: three periods of its beacon."""
+
+
+class Wanted(NamedTuple):
+    """The most urgent message of robot `node`, as it told it at `at`, in s."""
+
+    qos: Qos
+    priority: int
+    node: int
+    at: float
+
+    def is_before(self, qos: Qos, priority: int) -> bool:
+        """Whether this is as urgent as a message of that class and priority, or more."""
+        return (self.qos, -self.priority) <= (qos, -priority)
+
+
+class KnownWants:
+    """What is known of the robots `nodes`; those that heard the same bursts know the same."""
+
+    def __init__(self, nodes: Iterable[int]) -> None:
+        self._nodes = frozenset(nodes)
+        self._wanted: dict[int, Wanted] = {}
+        self._on_air_at: dict[int, float] = {}
+        """When each robot's last burst began."""
+        self.n_bursts = 0
+        """Count of bursts so far."""
+        self._missed_at = -inf
+        self._began_at: float | None = None
+        """Time of the first burst."""
+
+    def on_air(self, node: int, at: float) -> None:
+        """Note a burst of a robot that began at `at`."""
+        self._begin(at)
+        if node in self._nodes and at > self._on_air_at.get(node, -inf):
+            self._on_air_at[node] = at
+            self.n_bursts += 1
+
+    def told(self, node: int, waiting: Waiting | None, at: float) -> None:
+        """Note what a robot told in a burst that began at `at`; None: it wants nothing."""
+        if node not in self._nodes:
+            return
+        if waiting is None:
+            self._wanted.pop(node, None)
+        else:
+            self._wanted[node] = Wanted(waiting.qos, waiting.priority, node, at)
+
+    def missed(self, at: float) -> None:
+        """Note that a burst that ended at `at` could not be read."""
+        self._missed_at = at
+        self._begin(at)
+
+    def is_unsure(self, own: int, now: float) -> bool:
+        """Whether somebody may have told something else meanwhile, in a burst that was missed."""
+        if now > self._missed_at + WANTED_S:
+            return False
+        # Robots that were never heard may be here all the same, for some time.
+        began_at = self._missed_at if self._began_at is None else self._began_at
+        return any(
+            now - HERE_S < self._on_air_at.get(node, began_at) <= self._missed_at
+            for node in self._nodes
+            if node != own
+        )
+
+    def of(self, node: int, now: float) -> Wanted | None:
+        """What a robot wants, as far as it is known."""
+        found = self._wanted.get(node)
+        return found if found is not None and now < found.at + WANTED_S else None
+
+    def first(self, now: float) -> Wanted | None:
+        """What is the most urgent; of equals, that of the robot that was silent for longest."""
+        known = [each for node in self._wanted if (each := self.of(node, now)) is not None]
+        return min(known, key=self._rank, default=None)
+
+    def in_order(self) -> list[int]:
+        """All robots; whoever was silent for longest comes first."""
+        return sorted(self._nodes, key=lambda node: (self._on_air_at.get(node, -inf), node))
+
+    def _begin(self, at: float) -> None:
+        if self._began_at is None:
+            self._began_at = at
+
+    def _rank(self, wanted: Wanted) -> tuple[Qos, int, float, int]:
+        silent_since = self._on_air_at.get(wanted.node, -inf)
+        return wanted.qos, -wanted.priority, silent_since, wanted.node

@@ -1,0 +1,239 @@
+"""`auction`: the most urgent message of all robots goes next, and nobody clashes."""
+
+from collections import Counter
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sdrlinkd.errors import ConfigError
+from sdrlinkd.link import Qos, Sensed
+from sdrlinkd.link.access import Contest, Waiting, Wish, make_access, n_bits
+from sdrlinkd.wire import Want
+from tests.laws import law
+from tests.link.pulsing import FAST, PulsingAir
+from tests.link.radios import LOCKSTEP, params
+
+LONGEST_S = 0.004
+SHORT_S = 0.0005
+SETTLED_S = 1.5
+"""Until then, robots do not know whether they have missed something."""
+
+
+def make_air(n, seed, **more):
+    ppm = {node: Random(100 * seed + node).uniform(-20, 20) for node in range(n)}
+    return PulsingAir(n, seed, ppm=ppm, **more)
+
+
+def bound_s(n):
+    """A burst that has just begun, its mini-slots, a contest, and a block at each end."""
+    access = make_air(n, 0).nodes[0].access
+    return LONGEST_S + access.pause_s + access.round_s + 2 * FAST.react_s
+
+
+def waits_of(air, qos, since=SETTLED_S):
+    return [each.begin - each.arrived_at for each in air.bursts if each.qos == qos
+            and each.arrived_at > since]  # fmt: skip
+
+
+def send_at_random(air, node, qos, until_s, per_s=20.0):
+    at = SETTLED_S
+    while (at := at + air.rng.expovariate(per_s)) < until_s:
+        air.offer(node, at, qos, SHORT_S)
+
+
+@pytest.mark.parametrize("n", [2, 3, 8, 24])
+def test_bursts_never_overlap_whoever_sends_whatever(n):
+    for seed in range(3):
+        air = make_air(n, seed)
+        air.offer_randomly(2.0, per_s=40 / n)
+        assert len(air.run(4.0)) > 200
+        air.assert_nobody_clashes()
+        assert air.disturbed() == []
+        assert not any(node.waiting for node in air.nodes.values())
+
+
+@pytest.mark.parametrize("n", [2, 8, 24])
+def test_a_quiet_hand_over_takes_two_mini_slots_and_all_have_the_same_share(n):
+    air = make_air(n, 1)
+    air.saturate(900 // n, qos=Qos.BULK)
+    air.run(SETTLED_S + 2)
+    late = [each for each in air.bursts if each.begin > SETTLED_S]
+    access = air.nodes[0].access
+    assert sum(each.end - each.begin for each in late) > 0.97 * 2 * access.carries(LONGEST_S)
+    counts = Counter(each.src for each in late)
+    assert len(counts) == n
+    assert max(counts.values()) - min(counts.values()) <= 1
+
+
+@pytest.mark.parametrize("n", [3, 8, 24])
+@pytest.mark.parametrize(
+    ("most", "one"),
+    [
+        (Qos.BULK, Qos.URGENT),
+        (Qos.LATENCY, Qos.URGENT),
+        (Qos.DEFAULT, Qos.LATENCY),
+        (Qos.BULK, Qos.DEFAULT),
+    ],
+)
+def test_what_is_more_urgent_waits_for_one_burst(n, most, one):
+    air = make_air(n, 2)
+    air.saturate(1500 // n, qos=most)
+    send_at_random(air, n - 1, one, SETTLED_S + 3)
+    air.run(SETTLED_S + 3.2)
+    waits = waits_of(air, one)
+    assert len(waits) > 30
+    assert max(waits) <= bound_s(n) + 2 * SHORT_S
+    assert air.bursts[-1].qos == most, "the others still had something"
+
+
+def test_several_urgent_ones_at_once_wait_for_each_other_only():
+    n = 8
+    air = make_air(n, 3)
+    air.saturate(300, qos=Qos.BULK)
+    for k in range(20):
+        for node in range(n):
+            air.offer(node, SETTLED_S + 0.2 * k, Qos.URGENT, SHORT_S)
+    air.run(SETTLED_S + 4.2)
+    waits = waits_of(air, Qos.URGENT, SETTLED_S - 0.1)
+    each_s = SHORT_S + air.nodes[0].access.round_s + FAST.react_s
+    assert len(waits) == 20 * n
+    assert max(waits) <= bound_s(n) + n * each_s
+    air.assert_nobody_clashes()
+
+
+@pytest.mark.parametrize("n", [3, 8, 24])
+@pytest.mark.parametrize("miss", [0.01, 0.1])
+def test_whoever_misses_a_burst_does_not_clash(n, miss):
+    for seed in range(2):
+        air = make_air(n, seed, miss=miss)
+        air.saturate(1500 // n, qos=Qos.BULK)
+        send_at_random(air, 0, Qos.URGENT, SETTLED_S + 3)
+        air.run(SETTLED_S + 3.2)
+        air.assert_nobody_clashes()
+        waits = sorted(waits_of(air, Qos.URGENT))
+        assert waits[int(0.9 * len(waits))] <= 2 * bound_s(n)
+        assert len({each.src for each in air.bursts if each.begin > SETTLED_S}) == n
+
+
+@pytest.mark.parametrize("per_s", [5, 50, 500])
+def test_foreign_energy_as_short_as_a_pulse_costs_air_and_silences_nobody(per_s):
+    air = make_air(4, 5)
+    air.saturate(400, qos=Qos.BULK)
+    at, chance = 0.0, Random(1)
+    while (at := at + chance.expovariate(per_s)) < 4:
+        air.noise.append(at)
+    air.run(4.0)
+    late = [each for each in air.bursts if each.begin > SETTLED_S]
+    assert sum(each.end - each.begin for each in late) > 0.4 * 2.5
+    counts = Counter(each.src for each in late)
+    assert min(counts.values()) > 0.6 * len(late) / 4
+    clashes = [each for each in air.clashes() if each[0].begin > SETTLED_S]
+    assert len(clashes) <= 0.02 * len(late)
+    if per_s != 50:
+        assert ("disturbs" in air.nodes[0].access.state) == (per_s == 500)
+
+
+def test_after_long_silence_all_may_begin_at_once():
+    for seed in range(3):
+        air = make_air(4, seed)
+        for second in range(1, 30, 7):
+            for node in air.nodes:
+                air.offer(node, second + air.rng.uniform(0, 0.002))
+        assert len(air.run(31.0)) == 20
+        air.assert_nobody_clashes()
+
+
+def test_the_others_go_on_if_the_robot_that_is_next_has_left():
+    for seed in range(3):
+        air = make_air(5, seed)
+        air.saturate(300, qos=Qos.BULK)
+        air.run(SETTLED_S)
+        air.leave(seed)
+        air.run(SETTLED_S + 1)
+        late = Counter(each.src for each in air.bursts if each.begin > SETTLED_S + 0.1)
+        assert len(late) == 4
+        assert max(late.values()) - min(late.values()) <= 2
+        gaps = [b.begin - a.end for a, b in zip(air.bursts, air.bursts[1:], strict=False)
+                if a.begin > SETTLED_S]  # fmt: skip
+        access = next(iter(air.nodes.values())).access
+        assert max(gaps) <= 2 * access.pause_s + access.round_s + FAST.react_s
+        air.assert_nobody_clashes()
+
+
+@law()
+@given(st.data(), st.integers(2, 40))
+def test_a_contest_has_one_winner_the_most_urgent_one(data, n):
+    ranks = data.draw(st.sets(st.integers(0, n - 1), min_size=1))
+    classes = {rank: data.draw(st.sampled_from(Qos)) for rank in ranks}
+    waited = {rank: data.draw(st.booleans()) for rank in ranks}
+    parts = {rank: Contest(classes[rank], rank, n, has_waited=waited[rank]) for rank in ranks}
+    for bit in range(n_bits(n)):
+        pulsing = {rank for rank, part in parts.items() if part.pulses(bit)}
+        for rank, part in parts.items():
+            if pulsing - {rank}:
+                part.heard(bit)
+    first = min(ranks, key=lambda rank: (classes[rank], not waited[rank], rank))
+    assert [rank for rank, part in parts.items() if part.is_in] == [first]
+
+
+def test_it_needs_pulses_and_a_place_in_the_list():
+    with pytest.raises(ConfigError, match="sends no pulses"):
+        make_access(params("auction", [1, 2]), 1, LOCKSTEP, LONGEST_S, Random(1))
+    with pytest.raises(ConfigError, match=r"access\.nodes"):
+        make_access(params("auction", [2, 3]), 1, FAST, LONGEST_S, Random(1))
+
+
+def test_a_pulse_that_does_not_leave_ends_our_part_in_the_contest():
+    access = make_access(params("auction", [1, 2]), 1, FAST, LONGEST_S, Random(1))
+    now, pulses = 1.0, []
+    while len(pulses) < 2:
+        sensed = Sensed(now, 0.5, None, 0.5, None)
+        slot = access.slot(Wish(now + FAST.lead_s, Qos.URGENT, SHORT_S, sensed))
+        if slot is not None:
+            assert slot.is_pulse
+            pulses.append(slot.start)
+            now = slot.start + 1e-4
+            access.not_sent(slot.start)
+        now += 1e-4
+    # In the next round, as nobody has challenged in this one.
+    assert pulses[1] == pytest.approx(pulses[0] + access.pause_s, abs=1e-4)
+
+
+times = st.floats(0, 3)
+events = st.one_of(
+    st.tuples(st.just("heard"), st.integers(0, 255), st.booleans()),
+    st.tuples(st.just("want"), st.integers(0, 255), st.integers(0, 3), st.integers(0, 127)),
+    st.tuples(st.just("not_sent"), times),
+    st.tuples(st.just("sensed"), times, times, st.booleans(), st.lists(times, max_size=6)),
+)
+
+
+@law()
+@given(st.lists(events, max_size=40))
+def test_whatever_is_heard_slots_are_sound(given_events):
+    access = make_access(params("auction", [1, 2, 3]), 1, FAST, LONGEST_S, Random(1))
+    now, sensed = 1.0, Sensed(1.0, 0.0)
+    for kind, *fields in given_events:
+        now += 0.0007
+        if kind == "heard":
+            access.heard(fields[0], now, fields[1])
+        elif kind == "want":
+            access.take_want(Want(fields[0], fields[1], fields[2], 0, 5, 5), now)
+        elif kind == "not_sent":
+            access.not_sent(fields[0])
+        else:
+            end, at, has_burst, pulses = fields
+            burst_at = at if has_burst else None
+            sensed = Sensed(now, end, burst_at, end, burst_at, tuple(sorted(pulses)))
+        sensed = sensed._replace(until=now)
+        waiting = Waiting(Qos.LATENCY, 64, 0.1, 0.002, 0.5)
+        earliest = now + FAST.lead_s
+        slot = access.slot(Wish(earliest, Qos.LATENCY, SHORT_S, sensed, waiting))
+        if slot is not None:
+            assert slot.start >= earliest - 1e-6
+            if not slot.is_pulse:
+                access.told(waiting, slot.start)
+                access.sent(slot.start + SHORT_S, None)
+    assert access.state

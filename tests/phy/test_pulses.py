@@ -1,0 +1,91 @@
+"""Pulses of energy: a detector finds them wherever they begin, and a receiver ignores them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phy import N_PULSE, EnergyDetector, Receiver, Transmitter, pulse
+from phy.kernels.sensing import WINDOW
+from tests.laws import law
+from tests.phy.signals import noise, noisy, payloads, silence, turned
+
+REST = 40 * WINDOW
+
+
+def rng(seed=7):
+    return np.random.default_rng(seed)
+
+
+def test_its_level_is_constant_and_it_fills_the_band():
+    samples = pulse()
+    assert samples.shape == (N_PULSE,)
+    levels = np.abs(samples[8:-8])
+    assert levels == pytest.approx(np.ones(len(levels)), abs=1e-4)
+    spectrum = np.abs(np.fft.fft(samples * np.hanning(N_PULSE))) ** 2
+    assert np.count_nonzero(spectrum > 0.05 * spectrum.max()) > N_PULSE / 3
+
+
+@law()
+@given(st.integers(0, 3 * WINDOW), st.integers(1, 400), st.integers(0, 10**6))
+def test_it_is_found_once_wherever_it_begins_and_however_it_comes(offset, chunk, seed):
+    draws = rng(seed)
+    x = np.concatenate((silence(REST + offset), pulse(), silence(REST), pulse(), silence(REST)))
+    x = noisy(draws, turned(x, draws.uniform(-0.01, 0.01), draws.random()), 12)
+    sense = EnergyDetector()
+    for at in range(0, len(x), chunk):
+        sense.push(x[at : at + chunk])
+    begins = [REST + offset, 2 * REST + offset + N_PULSE]
+    assert len(sense.pulses) == 2
+    assert all(
+        abs(found - begin) < WINDOW for found, begin in zip(sense.pulses, begins, strict=True)
+    )
+    assert sense.carrier_until == 0
+
+
+def test_a_burst_is_a_carrier_and_no_pulse():
+    draws = rng()
+    burst = Transmitter().modulate(payloads(draws, 3, 220), 1)
+    x = noisy(draws, np.concatenate((silence(REST), burst, silence(REST))), 15)
+    sense = EnergyDetector()
+    sense.push(x)
+    assert sense.pulses == []
+    assert sense.carrier_until == sense.busy_until
+    assert abs(sense.carrier_until - REST - len(burst)) < 2 * WINDOW
+
+
+def test_a_burst_that_begins_is_told_from_a_pulse_in_time():
+    """Until it is as long as a pulse, it is neither; a pulse counts once it is over."""
+    draws = rng()
+    burst = Transmitter().modulate(payloads(draws, 3, 220), 1)
+    sense = EnergyDetector()
+    sense.push(noisy(draws, np.concatenate((silence(REST), burst[: 4 * WINDOW])), 15))
+    assert sense.pulses == []
+    sense.push(noisy(draws, burst[4 * WINDOW :], 15))
+    assert sense.pulses == []
+    assert sense.carrier_until > REST
+
+
+def test_noise_alone_has_none():
+    sense = EnergyDetector()
+    sense.push(noise(rng(), 2_000_000))
+    assert sense.pulses == []
+
+
+def test_only_the_last_ones_are_kept():
+    draws, sense = rng(), EnergyDetector()
+    for _ in range(40):
+        sense.push(noisy(draws, np.concatenate((silence(REST), pulse(), silence(REST))), 15))
+    step = 2 * REST + N_PULSE
+    assert [round(each / step - 0.5) for each in sense.pulses] == list(range(23, 40)), (
+        "16, and the last one"
+    )
+
+
+def test_a_receiver_makes_nothing_of_it():
+    draws, receiver = rng(), Receiver()
+    for _ in range(50):
+        gap = silence(int(draws.integers(200, 3000)))
+        sent = turned(np.concatenate((gap, pulse())), draws.uniform(-0.02, 0.02), draws.random())
+        assert not list(receiver.push(noisy(draws, sent, 25)))
+    assert receiver.claim[0] <= 0
