@@ -58,6 +58,13 @@ ROWS = {
         "reroute_s", "reroute_to_all_s",
         "urgent_p99_ms_8", "urgent_p99_ms_24", "carried_mbps_8", "carried_mbps_24",
         "default_over_bulk_max_ms_8",
+        *(f"rtwmp_table{n}_laser_{each}" for n in (1, 3) for each in ("ms", "std_ms", "mdr_pct")),
+        *(
+            f"rtwmp_table{n}_image_{each}"
+            for n in (2, 4) for each in ("ms", "period_ms", "mdr_pct", "mbps")
+        ),
+        *(f"rtwmp_table5_{n}n_s" for n in (2, 3)),
+        *(f"rtwmp_{each}_{n}" for n in (8, 24) for each in ("urgent_p99_ms", "carried_mbps")),
     },
     "modem_path": {
         "odom_30hz_latency_ms_p50",

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from statistics import median
 
 from benchmarks.report import Row, main
-from benchmarks.team import crowd_rows
+from benchmarks.team import crowd_rows, rtwmp_rows
 from benchmarks.team.chain import Carried, carry
 from benchmarks.team.healing import PERIOD_S, heal
 from benchmarks.team.turnaround import wait_for_turns
@@ -32,6 +32,7 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
                 "from the death of the relay until the first message that was sent after it"
             ),
         )  # fmt: skip
+    yield from rtwmp_rows.rows(seed, quick)
 
 
 def _chain(seed: int, quick: bool) -> Iterator[Row]:

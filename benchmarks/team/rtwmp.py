@@ -19,6 +19,8 @@ FITTED = PAPER._replace(host_s=0.8e-3)
 """Host time: the only fitted value, chosen so that Table II's images come as often as there."""
 AS_PROGRAMMED = PAPER._replace(host_s=0.2e-3, returns=True)
 """The token returns to its beginner, as in the authors' program; fitted in the same way."""
+PATIENT = FITTED._replace(ack_margin_s=0.1)
+"""A node waits as long for an answer as in the authors' program."""
 LATE_S = 0.3
 NUMBERS = 1_000_000
 URGENT, BULK = 100, 10

@@ -4,10 +4,10 @@
     network.send(Message(1, src=0, dst=2, octets=1024, priority=9, at=0.0))
     network.run(1.0)
 
-Sources: D. Tardioli and J. L. Villarroel, "Real Time Communications over 802.11: RT-WMP", MASS
-2007; the Pound paper, IV-C; for field sizes, queue and times the authors' program,
-github.com/dantard/unizar-rt-wmp-ros-pkg. The program adds to the published protocol; the classes
-say which of its additions are here.
+Published by D. Tardioli and J. L. Villarroel, "Real-Time Communications over 802.11: RT-WMP",
+MASS 2007. What is here comes from the Pound paper, IV-C, which sums it up, and from the authors'
+program, github.com/dantard/unizar-rt-wmp-ros-pkg, in its basic routing: sizes of fields, queue,
+retries and times. Its pruning of links, power saving and bursts are not here.
 """
 
 from benchmarks.peers.pound.rtwmp.bound import LoopBound, loop_bound

@@ -23,10 +23,10 @@ class Params(NamedTuple):
     retries: int = 1
     """How often a frame is repeated that nobody was heard to forward."""
     ack_margin_s: float = 1e-3
-    """Assumed: what the wait for that has beyond the longest frame. The program waits for 100 ms,
-    which costs two losses in a hundred messages a fifth of the channel."""
+    """Assumed: how much longer than the longest frame a node waits for that. The program waits for
+    100 ms."""
     rest_s: float = 0.1
-    """How often a node that hears nobody tries to reach somebody."""
+    """Assumed, from the program's 100 ms: how often a node that hears nobody tries to reach one."""
     search_loops: int = 8
     """Assumed: one loop in so many searches for a lost node. The program does it in each."""
     hold_s: float = 1.5
