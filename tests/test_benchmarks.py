@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.phy_per import false_pdus_in
+from benchmarks.timesync.moving import MOTIONS
 from phy import Transmitter
 from sdrlinkd.cli.benchmarks import BENCHMARKS
 from tests.pdulink.gnu_radio import no_gnu_radio
@@ -28,6 +29,8 @@ ROWS = {
         "bad_stamps_1pct_rms_us",
         "off_by_500ppm_rms_us",
         "bound_holds_pct",
+        *(f"rms_us_{each}" for each in MOTIONS),
+        "clock_bound_held_pct",
         "sample_clock_rms_us_1msps",
     },
     "bus": {

@@ -7,9 +7,11 @@ import sys
 from collections.abc import Iterator
 
 from benchmarks.report import Drawing, Row, main
-from benchmarks.timesync import pictures, rows
+from benchmarks.timesync import moving_rows, pictures, rows
 
 HZ = 5.0
+QUICK_S = 300.0
+"""Longest stream of a moving clock with `--quick`, in s."""
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row | Drawing]:
@@ -22,6 +24,7 @@ def measure(seed: int, quick: bool) -> Iterator[Row | Drawing]:
     yield from rows.hostile(seed, runs, HZ, held)
     yield Row("bound_holds_pct", held.percent, "%", 99.9, "more", held.all,
               note="all scenarios, without the 5 s after each step")  # fmt: skip
+    yield from moving_rows.measure(seed, *((1, QUICK_S) if quick else (8, float("inf"))))
     yield rows.sample_clocks(seed, 15.0 if quick else 60.0)
     yield from rows.recorded()
     if not quick:

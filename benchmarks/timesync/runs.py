@@ -34,12 +34,23 @@ class Course(NamedTuple):
             return float("inf")
         return float(self.at[after][wrong[-1] + 1] - since)
 
-    def held(self, step_at: float = np.inf) -> tuple[int, int]:
-        """(errors within their bound, errors with a bound), without the 5 s after a step."""
-        counts = np.isfinite(self.bound_s)
-        counts &= (self.at < step_at) | (self.at > step_at + SETTLING_S)
+    def held(self, *steps_at: float) -> tuple[int, int]:
+        """(errors within their bound, errors with a bound), without the 5 s after each step."""
+        counts = np.isfinite(self.bound_s) & self._settled(*steps_at)
         good = np.abs(self.error_s[counts]) <= self.bound_s[counts]
         return int(np.count_nonzero(good)), int(np.count_nonzero(counts))
+
+    def errors_us(self, since: float, *steps_at: float) -> np.ndarray:
+        """The errors from `since` in s on, without the 5 s after each step, in µs."""
+        counts = np.isfinite(self.error_s) & (self.at >= since) & self._settled(*steps_at)
+        errors_us: np.ndarray = 1e6 * self.error_s[counts]
+        return errors_us
+
+    def _settled(self, *steps_at: float) -> np.ndarray:
+        settled = np.ones(len(self.at), bool)
+        for step_at in steps_at:
+            settled &= (self.at < step_at) | (self.at > step_at + SETTLING_S)
+        return settled
 
 
 def follow(filter_: Filter, stream: Stream) -> Course:

@@ -1,6 +1,6 @@
 """Exchanges of stamps between two clocks over a radio with queues."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -96,16 +96,31 @@ def stream(
     ]
     wrong = np.where(rng.random((3, n)) < bad_share, rng.uniform(-0.05, 0.05, (3, n)), 0.0)
     arrived = rng.random((2, n)) >= LOSS
+    return Stream(exchanges(t1, offset, skew, delays, wrong, arrived), t1, offset)
+
+
+def exchanges(
+    t1: np.ndarray,
+    offset: np.ndarray,
+    skew: np.ndarray,
+    delays: Sequence[np.ndarray],
+    wrong: np.ndarray,
+    arrived: np.ndarray,
+) -> list[Exchange]:
+    """The exchanges that begin at the local times `t1`, all in s.
+
+    `offset`, `skew`: local minus remote time, and its growth in s per s. `delays`: there and back.
+    `wrong`: errors of t2, t3 and t4. `arrived`: whether each message there and back did.
+    """
     t2 = t1 + delays[0] - offset
     t3 = t2 + TURNAROUND_S
     t4 = t3 + offset + skew * TURNAROUND_S + delays[1]
-    exchanges = [
+    return [
         Exchange(
             float(t1[i]),
             float(t2[i] + wrong[0, i]) if arrived[0, i] else None,
             float(t3[i] + wrong[1, i]) if arrived[1, i] else None,
             float(t4[i] + wrong[2, i]) if arrived[1, i] else None,
         )
-        for i in range(n)
+        for i in range(len(t1))
     ]
-    return Stream(exchanges, t1, offset)
