@@ -48,8 +48,10 @@ class Course(NamedTuple):
 
     def _settled(self, *steps_at: float) -> np.ndarray:
         settled = np.ones(len(self.at), bool)
+        period_s = self.at[1] - self.at[0]
         for step_at in steps_at:
-            settled &= (self.at < step_at) | (self.at > step_at + SETTLING_S)
+            # The error just before the exchange at which the clock steps contains the step.
+            settled &= (self.at < step_at - 1.5 * period_s) | (self.at > step_at + SETTLING_S)
         return settled
 
 
