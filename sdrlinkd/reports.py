@@ -103,6 +103,8 @@ class ClockReport(msgspec.Struct, frozen=True, kw_only=True):
     """Time stamps taken, of both directions."""
     steps: int = 0
     """How often the clock jumped."""
+    false_steps: int = 0
+    """How often the clock seemed to jump but had not; not among `steps`."""
     contradicted: int = 0
     """Time stamps rejected because they contradict the others."""
     refused: int = 0

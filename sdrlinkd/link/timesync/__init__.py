@@ -5,12 +5,17 @@ reads no clock, and does not decide when a record is sent.
 """
 
 from sdrlinkd.link.timesync.clocks import ClockParams, Clocks
-from sdrlinkd.link.timesync.envelope import DualEnvelope, Estimate
+from sdrlinkd.link.timesync.envelope import DualEnvelope
+from sdrlinkd.link.timesync.estimate import Estimate
 from sdrlinkd.link.timesync.paper import PaperFilter
 from sdrlinkd.link.timesync.peer import PeerClock, State, Wall
 from sdrlinkd.link.timesync.side import Side
+from sdrlinkd.link.timesync.wander import Wander
+from sdrlinkd.link.timesync.way import STEP_S, WINDOW_S
 
 __all__ = [
+    "STEP_S",
+    "WINDOW_S",
     "ClockParams",
     "Clocks",
     "DualEnvelope",
@@ -20,4 +25,5 @@ __all__ = [
     "Side",
     "State",
     "Wall",
+    "Wander",
 ]

@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from sdrlinkd.link.timesync.envelope import DualEnvelope, Estimate
+from sdrlinkd.link.timesync.envelope import DualEnvelope
+from sdrlinkd.link.timesync.estimate import Estimate
 from sdrlinkd.link.timesync.paper_clock import PaperClock
 from sdrlinkd.link.timesync.peer import Offset, PeerClock, State, Wall
 from sdrlinkd.reports import ClockReport

@@ -5,66 +5,30 @@ about our burst bounds it from below. The shortest delays of the two directions 
 together, so with N messages each way the error falls as 1/N; a filter over round trips gains only
 1/√N. Delays are counted beyond the airtime, which both robots know.
 
-Geometry: over local time x, each sample of one direction is a point above the line of the true
-offset, and each sample of the other a point below it. Clocks drift, so the line has a slope, the
-skew, of at most MOST. Every line between the two clouds is possible. For a given slope, the highest
-and the lowest possible line each touch a cloud. Their mean is the best estimate and half their
-distance is the bound, because delays are positive and their smallest values are unknown
-(`_bounds`). Among slopes, a line is more likely the closer the samples are to it. If delays beyond
-their smallest value are exponential, the likelihood of a slope is the product of 1/(mean excess)^n
-over both directions (`_weights`), times a prior for crystals. The offset is the mean over slopes
-with these weights; its bound covers every possible line, however unlikely.
+Clocks drift, and crystals move. The offset is that of the most likely line through the samples of
+the last minute (`fit`). The bound covers every possible line, however unlikely, of a frequency that
+moves (`wander`). It also covers three kinds of contradiction:
+
+- The two directions fit no line, not even a bent one. Either the latest samples contradict each
+  other nearly as much, then stamps are noisy, and the bound grows by the contradiction. Or they do
+  not, then the clock's rate has changed, and the older half of the samples is dropped.
+- Few samples contradict the others by at most STEP_S. They are held back (`way`), and the bound
+  grows by twice that, as the clock may just have begun to move.
+- Many do. The clock has moved: all older samples are dropped. As long as the move may turn out
+  false (`before`), the bound covers both.
 """
 
-from collections import deque
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
-from sdrlinkd.link.timesync.side import Side
+from sdrlinkd.link.timesync.before import Before
+from sdrlinkd.link.timesync.estimate import Estimate
+from sdrlinkd.link.timesync.fit import Fit, Lines
+from sdrlinkd.link.timesync.wander import Wander
+from sdrlinkd.link.timesync.way import STEP_S, WINDOW_S, Held, Way
 
-WINDOW_S = 60.0
-PRIOR_PPM = 30.0
-"""Typical difference of two ordinary clocks, in ppm."""
-MOST = 1.2e-3
-"""Largest difference of two clocks' rates, in s per s."""
-MISS_S = 5e-4
-"""Margin in s by which a sample must violate the bound to count as contradicting the others."""
-RUNNING, AMONG = 3, 8
-"""A clock was stepped if RUNNING of the last AMONG samples of a direction contradict the others.
-With fewer, they are bad stamps, unless the rule of PAIR applies."""
-PAIR, LATELY, OPPOSITE = 2, 25, 4
-"""A clock was also stepped if PAIR of the last LATELY samples contradict, and at least OPPOSITE
-samples of the other direction came meanwhile, all of them late by at least as much."""
-FLOOR_SHARE = 0.05
-"""Share of the airtime of both directions by which delays may come out shorter than the airtime."""
-NEGLIGIBLE = 3e-4
-"""Likelihood of a slope, relative to the most likely one, below which it is ignored."""
-GRID = 33
-
-_Slopes = NDArray[np.float64]
-
-
-class Estimate(NamedTuple):
-    """Local minus remote time at local time `at`: `offset_s`, with an error of at most `bound_s`.
-
-    `skew` is the growth of the offset in s per s, with an error of at most `skew_bound`.
-    """
-
-    at: float
-    offset_s: float
-    skew: float
-    bound_s: float
-    skew_bound: float
-
-    def offset(self, now: float) -> float:
-        """The offset in s, extrapolated to `now`."""
-        return self.offset_s + self.skew * (now - self.at)
-
-    def bound(self, now: float) -> float:
-        """Largest error of the offset at `now`, in s."""
-        return self.bound_s + self.skew_bound * max(0.0, now - self.at)
+NOISE_S, NOISE_SHARE = 15.0, 0.5
+"""Stamps are noisy if the contradiction among those of the last NOISE_S is at least NOISE_SHARE of
+that among all. In so short a time, wander bends a line by a sixteenth of what it does in 60 s."""
 
 
 class DualEnvelope:
@@ -76,175 +40,165 @@ class DualEnvelope:
 
     def __init__(self, resolution_s: float = 2e-5) -> None:
         self._resolution_s = resolution_s
-        self._above, self._below = Side(WINDOW_S), Side(WINDOW_S)
-        self._airtime_s = [0.0, 0.0]
-        self._running: dict[Side, deque[tuple[float, float] | None]] = {
-            side: deque(maxlen=LATELY) for side in (self._above, self._below)
-        }
+        self._above, self._below = self._ways = Way(1.0), Way(-1.0)
+        self._wander = Wander(self._resolution_s, WINDOW_S)
+        self._before: Before | None = None
+        self._known: Estimate | None = None
+        """The estimate without doubts."""
         self.estimate: Estimate | None = None
         self.samples = 0
         self.steps = 0
         """How often a clock was seen to jump."""
+        self.false_steps = 0
+        """How often a clock was taken to have jumped, but had not; not among `steps`."""
         self.contradicted = 0
         """Time stamps rejected because they contradict the others."""
         self.narrowed = 0
-        """How often older samples were dropped because delays came out shorter than the airtime."""
+        """How often older samples were dropped because no line and no crystal explains them."""
 
     def heard(self, sent_there: float, came_here: float, airtime_s: float) -> None:
         """Take a burst of the other robot: sent at its time, heard at ours."""
-        self._airtime_s[0] = airtime_s
-        self._note(self._above, self._below, came_here, came_here - sent_there - airtime_s, 1.0)
+        self._note(self._above, self._below, came_here, came_here - sent_there - airtime_s)
 
     def was_heard(self, sent_here: float, came_there: float, airtime_s: float) -> None:
         """Take a burst of ours: sent at our time, heard at the other robot's."""
-        self._airtime_s[1] = airtime_s
-        self._note(self._below, self._above, sent_here, came_there - sent_here - airtime_s, -1.0)
+        self._note(self._below, self._above, sent_here, came_there - sent_here - airtime_s)
 
     def solve(self, now: float) -> Estimate | None:
         """The estimate at `now` from all samples; None while a direction has none."""
-        for side in (self._above, self._below):
-            side.forget_before(now - WINDOW_S)
-        least_gap_s = -FLOOR_SHARE * sum(self._airtime_s) - 2 * self._resolution_s
-        while self._above and self._below:
-            fit = _Fit(self._above, self._below, now, self._resolution_s)
-            if fit.gap_s >= least_gap_s:
-                self.estimate = fit.estimate()
-                return self.estimate
+        for way in self._ways:
+            way.side.forget_before(now - WINDOW_S)
+        self._known = self.estimate = None
+        while self._above.side and self._below.side:
+            fit = self._fit(now)
+            if fit is not None:
+                self._known = self._bounded(fit, now)
+                self.estimate = self._doubted(self._known)
+                break
             self.narrowed += 1
             self._drop_older_half()
-        self.estimate = None
-        return None
+        return self.estimate
 
     def forget(self) -> None:
         """Forget all samples, as the other robot has a new clock."""
-        for side, running in self._running.items():
-            side.clear()
-            running.clear()
-        self.estimate = None
+        for way in self._ways:
+            way.clear()
+        self._wander = Wander(self._resolution_s, WINDOW_S)
+        self._before = self._known = self.estimate = None
 
-    def _note(self, side: Side, other: Side, x: float, v: float, sign: float) -> None:
-        self.samples += 1
-        known, running = self.estimate, self._running[side]
-        slope = 0.0 if known is None else sign * known.skew
-        contradicts = known is not None and v < sign * known.offset(x) - known.bound(x) - MISS_S
-        running.append((x, v) if contradicts else None)
-        self.contradicted += contradicts
-        if not contradicts:
-            side.add(x, v, slope)
-        if known is not None and self._was_stepped(side, other, known, sign):
-            self._restart(side, other, slope)
+    def _fit(self, now: float) -> Fit | None:
+        """The most likely line, with the least wander that explains all samples; None: none does.
 
-    def _was_stepped(self, side: Side, other: Side, known: Estimate, sign: float) -> bool:
-        running = list(self._running[side])
-        held = [each for each in running if each is not None]
-        if len(held) < PAIR:
-            return False
-        if len(running[-AMONG:]) - running[-AMONG:].count(None) >= RUNNING:
-            return True
-        misses_s = [sign * known.offset(x) - known.bound(x) - v for x, v in held]
-        since = other.x >= held[0][0]
-        late_s = other.v[since] + sign * known.offset(known.at) + known.bound_s
-        late_s += sign * known.skew * (other.x[since] - known.at)
-        return len(late_s) >= OPPOSITE and bool(late_s.min() >= max(misses_s))
+        Each stamp may be off by its resolution, or by more if stamps are noisy.
+        """
+        above, below = self._above.side, self._below.side
+        learned = self._wander.learned(now)
+        fit = Fit(above, below, now, self._resolution_s, learned)
+        if fit.gap_s >= -2 * self._resolution_s or self._is_noisy(now, fit.gap_s):
+            return fit
+        for wander in self._wander.steps(now):
+            fit = Fit(above, below, now, self._resolution_s, wander)
+            if fit.gap_s >= -2 * self._resolution_s:
+                self._wander.learn(wander, now)
+                return fit
+        return None
 
-    def _restart(self, side: Side, other: Side, slope: float) -> None:
-        """Start over with the contradicting samples, and those of the other direction since."""
-        contradicting = [each for each in self._running[side] if each is not None]
-        for running in self._running.values():
-            running.clear()
-        side.clear()
-        other.forget_before(contradicting[0][0])
-        for x, v in contradicting:
-            side.add(x, v, slope)
-        self.contradicted -= len(contradicting)
-        self.steps += 1
-        self.estimate = None
+    def _is_noisy(self, now: float, gap_s: float) -> bool:
+        """Whether the latest samples fit a line hardly better than all, and all nearly do."""
+        latest = Lines(self._above.side, self._below.side, now, 0.0, NOISE_S)
+        return gap_s >= -STEP_S and latest.is_known and latest.widest()[1] < NOISE_SHARE * gap_s
 
-    def _drop_older_half(self) -> None:
-        times = np.concatenate((self._above.x, self._below.x))
-        middle = np.nextafter(float(np.median(times)), np.inf)
-        for side in (self._above, self._below):
-            side.forget_before(middle)
-
-
-class _Fit:
-    """Fits a common slope to both envelopes.
-
-    A slope is possible if no delay becomes negative. Likelihoods assume that delays are exponential
-    and that clocks differ by about 30 ppm.
-    """
-
-    def __init__(self, above: Side, below: Side, now: float, resolution_s: float) -> None:
-        self._now = now
-        self._resolution_s = resolution_s
-        (x_above, v_above), (x_below, v_below) = above.lowest(MOST), below.lowest(MOST)
-        self._x, self._v = (x_above - now, x_below - now), (v_above, v_below)
-        self._totals = [(n, x - now, v) for n, x, v in (above.totals(), below.totals())]
-        low, high = -MOST, MOST
-        for _ in range(4):
-            slopes = np.linspace(low, high, GRID)
-            gaps_s = self._gaps(slopes)
-            best = int(np.argmax(gaps_s))
-            low, high = slopes[max(0, best - 1)], slopes[min(GRID - 1, best + 1)]
-        self.gap_s = float(gaps_s[best])
-        """Largest gap between the two envelopes over all slopes, in s."""
-        steps = (high - low) * 2.0 ** np.arange(26)
-        self._lowest = self._last_possible(slopes[best], np.maximum(slopes[best] - steps, -MOST))
-        self._highest = self._last_possible(slopes[best], np.minimum(slopes[best] + steps, MOST))
-
-    def estimate(self) -> Estimate:
-        """The estimate: means over all likely slopes, bounds over all possible ones."""
-        slopes = np.linspace(self._lowest, self._highest, GRID)
-        likely = np.flatnonzero(self._weights(slopes) > NEGLIGIBLE)
-        first, last = max(0, likely[0] - 1), min(GRID - 1, likely[-1] + 1)
-        slopes = np.linspace(slopes[first], slopes[last], 2 * GRID)
-        weights = self._weights(slopes)
-        weights /= weights.sum()
-        above, below = self._bounds(slopes)
-        offset_s = float((above - below) @ weights / 2)
-        skew = float(slopes @ weights)
+    def _bounded(self, fit: Fit, now: float) -> Estimate:
+        """The likely line with the bounds of all possible ones, in which the wander is larger."""
+        wander = self._wander.allowed(now)
+        lines = Lines(self._above.side, self._below.side, now, wander)
+        slack_s = self._resolution_s + max(0.0, -float(lines.gaps(np.array([fit.best]))[0]))
+        lowest, highest = lines.possible(fit.best, fit.step, -2 * slack_s)
         # All samples are in the past, so the offset at `now` grows with the slope for both bounds.
-        least_s = -float(self._bounds(np.array([self._lowest]))[1][0])
-        most_s = float(self._bounds(np.array([self._highest]))[0][0])
+        above, below = lines.bounds(np.array([lowest, highest]))
+        least_s, most_s = -float(below[0]) - slack_s, float(above[1]) + slack_s
+        offset_s, skew = fit.line()
         return Estimate(
-            self._now,
+            now,
             offset_s,
             skew,
-            max(most_s - offset_s, offset_s - least_s, 0.0) + self._resolution_s,
-            max(self._highest - skew, skew - self._lowest),
+            max(most_s - offset_s, offset_s - least_s),
+            max(highest - skew, skew - lowest),
+            wander,
         )
 
-    def _bounds(self, slopes: _Slopes) -> tuple[_Slopes, _Slopes]:
-        """(upper bounds, negated lower bounds) of the offset now, for each slope."""
-        above = (self._v[0] - slopes[:, None] * self._x[0]).min(axis=1)
-        below = (self._v[1] + slopes[:, None] * self._x[1]).min(axis=1)
-        return above, below
+    def _doubted(self, known: Estimate) -> Estimate:
+        """The estimate with a bound that holds even if the samples held back are right.
 
-    def _gaps(self, slopes: _Slopes) -> _Slopes:
-        above, below = self._bounds(slopes)
-        return above + below
-
-    def _weights(self, slopes: _Slopes) -> _Slopes:
-        """Likelihood of each slope relative to the most likely one."""
-        above, below = self._bounds(slopes)
-        (n_above, x_above, v_above), (n_below, x_below, v_below) = self._totals
-        # Each bucket keeps its lowest sample for one slope, which may not be lowest for others.
-        excess = np.maximum(v_above - slopes * x_above - above, 0.0) + self._resolution_s
-        lack = np.maximum(v_below + slopes * x_below - below, 0.0) + self._resolution_s
-        # The constant keeps crystals with a large error possible, though unlikely.
-        unusual = -np.log(np.exp(-((1e6 * slopes / PRIOR_PPM) ** 2) / 2) + 1e-6)
-        costs = n_above * np.log(excess) + n_below * np.log(lack) + unusual
-        weights: _Slopes = np.exp(costs.min() - costs)
-        return weights
-
-    def _last_possible(self, inner: float, outer: _Slopes) -> float:
-        """The farthest slope from `inner` for which no delay is negative, rounded outwards.
-
-        `outer` lists slopes at increasing distance.
+        It also holds if the last move of the clock turns out false.
         """
-        possible = self._gaps(outer) >= 0
-        if possible.all():
-            return float(outer[-1])
-        first_not = int(np.argmin(possible))
-        slopes = np.linspace(outer[first_not - 1] if first_not else inner, outer[first_not], GRID)
-        return float(slopes[int(np.argmin(self._gaps(slopes) >= 0))])
+        bound_s = known.bound_s + max(way.doubt_s for way in self._ways)
+        skew_bound = known.skew_bound
+        if self._before is not None:
+            before = self._before.known
+            moved_s = abs(known.offset_s - before.offset(known.at))
+            bound_s = max(bound_s, moved_s + before.bound(known.at))
+            skew_bound = max(skew_bound, abs(known.skew - before.skew) + before.skew_bound)
+        return known._replace(bound_s=bound_s, skew_bound=skew_bound)
+
+    def _note(self, way: Way, other: Way, x: float, v: float) -> None:
+        self.samples += 1
+        if self._before is not None:
+            self._before.note(way.sign, x, v)
+            if self._before.is_false:
+                self._undo(self._before)
+                return
+            if self._before.is_settled:
+                self._before = None
+        known = self._known
+        if known is None:
+            way.take(x, v, 0.0)
+            return
+        early_s = known.early_s(x, v, way.sign)
+        if early_s > 0:
+            self.contradicted += 1
+            way.hold(Held(x, v, early_s))
+            if way.has_moved(other.side):
+                self._restart(way, other, known)
+        else:
+            way.take(x, v, way.sign * known.skew)
+            other.refute(x, known.delay_s(x, v, way.sign))
+            if other.has_moved(way.side):
+                self._restart(other, way, known)
+
+    def _restart(self, way: Way, other: Way, known: Estimate) -> None:
+        """Start over with the contradicting samples, and those of the other direction since."""
+        held = way.held
+        is_step = max(each.early_s for each in held) > STEP_S
+        self._before = Before(self._ways, way, known, is_step=is_step)
+        way.clear()
+        other.clear_held()
+        other.side.forget_before(held[0].x)
+        for x, v, _ in held:
+            way.side.add(x, v, way.sign * known.skew)
+        self.contradicted -= len(held)
+        self.steps += is_step
+        self.narrowed += not is_step
+        self._known = self.estimate = None
+
+    def _undo(self, before: Before) -> None:
+        """Go back to what was known before a step that turned out false."""
+        self._before, self._known, self.estimate = None, before.known, before.known
+        self.steps -= before.is_step
+        self.false_steps += before.is_step
+        self.contradicted += len(before.held)
+        for way, side in zip(self._ways, before.sides, strict=True):
+            way.clear()
+            way.side = side
+        for sign, x, v in before.since:
+            way = self._above if sign > 0 else self._below
+            if before.known.early_s(x, v, sign) > 0:
+                self.contradicted += 1
+            else:
+                way.take(x, v, sign * before.known.skew)
+
+    def _drop_older_half(self) -> None:
+        times = np.concatenate((self._above.side.x, self._below.side.x))
+        middle = np.nextafter(float(np.median(times)), np.inf)
+        for way in self._ways:
+            way.side.forget_before(middle)

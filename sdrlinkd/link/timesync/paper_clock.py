@@ -9,7 +9,8 @@ no estimate.
 
 from collections import deque
 
-from sdrlinkd.link.timesync.envelope import MOST, Estimate
+from sdrlinkd.link.timesync.estimate import Estimate
+from sdrlinkd.link.timesync.fit import MOST
 from sdrlinkd.link.timesync.paper import PaperFilter
 
 LATELY = 64
@@ -31,6 +32,8 @@ class PaperClock:
         self.estimate: Estimate | None = None
         self.samples = 0
         """Round trips taken."""
+        self.false_steps = 0
+        """Always 0: a reset is never undone."""
         self.contradicted = 0
         """Round trips that were too long, or whose offset was too far from the known one."""
 

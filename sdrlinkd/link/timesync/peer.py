@@ -4,8 +4,10 @@ from collections import OrderedDict
 from enum import Enum
 from typing import NamedTuple
 
-from sdrlinkd.link.timesync.envelope import WINDOW_S, DualEnvelope, Estimate
+from sdrlinkd.link.timesync.envelope import DualEnvelope
+from sdrlinkd.link.timesync.estimate import Estimate
 from sdrlinkd.link.timesync.paper_clock import PaperClock
+from sdrlinkd.link.timesync.way import WINDOW_S
 from sdrlinkd.reports import ClockReport
 from sdrlinkd.wire import CLOCK_NUMBERS, UNKNOWN_WALL, Arrival, Clock
 
@@ -149,6 +151,7 @@ class PeerClock:
             period_s=self.period_s,
             samples=offset.samples,
             steps=offset.steps,
+            false_steps=offset.false_steps,
             contradicted=offset.contradicted,
             refused=self.refused,
             resets=self.resets,

@@ -33,9 +33,17 @@ class Side:
         """Bounds that the samples give, in s."""
         return self._rows[1, self._begin : self._end]
 
-    def lowest(self, steepest: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(times, bounds) of the samples that a line with a slope within ±`steepest` can touch."""
-        x, v = self.x, self.v
+    def lowest(
+        self, steepest: float, now: float = 0.0, wander: float = 0.0, oldest_s: float = math.inf
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(times, bounds) of the samples that a line with a slope within ±`steepest` can touch.
+
+        Each bound is relaxed by what a frequency that moves by `wander` per s can bend until `now`.
+        Samples that are older than `oldest_s` by then are left out.
+        """
+        first = int(np.searchsorted(self.x, now - oldest_s))
+        x = self.x[first:]
+        v = self.v[first:] + 0.5 * wander * (x - now) ** 2
         later, earlier = v + steepest * x, v - steepest * x
         keep = later <= np.minimum.accumulate(later[::-1])[::-1]
         keep &= earlier <= np.minimum.accumulate(earlier)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import DualEnvelope
-from sdrlinkd.link.timesync import Side
+from sdrlinkd.link.timesync import STEP_S, Side
 from tests.laws import law
 
 SEED = 11
@@ -181,3 +181,90 @@ def test_samples_in_any_order_end():
         envelope.was_heard(number * 0.15, number * 0.15 - 5.0, 0.0)
         envelope.heard(number * 0.15 + 9.0, number * 0.15, 0.0)
     assert envelope.solve(7.0) is None
+
+
+def settled(offset_s=1.0):
+    """An envelope that knows an offset from 10 s of exchanges, each with a delay of 10 µs."""
+    envelope = DualEnvelope(RESOLUTION_S)
+    for i in range(50):
+        exchange(envelope, i / 5, offset_s, 1e-5, 1e-5)
+        envelope.solve(i / 5)
+    return envelope
+
+
+def heard(envelope, at, offset_s, delay_s=1e-5):
+    envelope.heard(at - delay_s - offset_s, at, 0.0)
+
+
+def was_heard(envelope, at, offset_s, delay_s=1e-5):
+    envelope.was_heard(at, at + delay_s - offset_s, 0.0)
+
+
+@pytest.mark.parametrize("step_s", [-0.002, -2e-4])
+def test_two_early_records_and_four_late_ones_the_other_way_show_that_a_clock_moved(step_s):
+    """Long waits between the two early records, so that the rule of three of eight says nothing."""
+    envelope = settled()
+    after_s = 1.0 + step_s
+    heard(envelope, 10.0, after_s)
+    for i in range(8):
+        heard(envelope, 10.1 + i / 5, after_s, 0.02)
+    heard(envelope, 12.0, after_s)
+    for i in range(3):
+        was_heard(envelope, 12.1 + i / 5, after_s)
+    assert (envelope.contradicted, envelope.steps, envelope.narrowed) == (2, 0, 0)
+    was_heard(envelope, 13.0, after_s)
+    is_step = abs(step_s) > STEP_S
+    assert (envelope.contradicted, envelope.steps, envelope.narrowed) == (0, is_step, not is_step)
+    assert abs(envelope.solve(13.0).offset_s - after_s) < 5e-5
+
+
+def test_two_early_records_are_bad_if_one_the_other_way_is_not_late():
+    envelope = settled()
+    heard(envelope, 10.0, 0.998)
+    heard(envelope, 12.0, 0.998)
+    for i in range(6):
+        was_heard(envelope, 12.1 + i / 5, 1.0, 1e-5 if i == 2 else 0.02)
+    assert (envelope.contradicted, envelope.steps, envelope.narrowed) == (2, 0, 0)
+    assert abs(envelope.solve(13.5).offset_s - 1.0) < 5e-5
+
+
+def test_a_step_that_turns_out_false_is_undone_and_counted():
+    """Three early stamps while nothing comes the other way."""
+    envelope = settled()
+    before = envelope.estimate
+    for i in range(3):
+        heard(envelope, 10.0 + i / 5, 0.995)
+    assert (envelope.steps, envelope.false_steps) == (1, 0)
+    was_heard(envelope, 10.6, 1.0)
+    assert envelope.solve(10.6) is None, "no line fits what came since"
+    heard(envelope, 10.7, 1.0)
+    was_heard(envelope, 10.8, 1.0)
+    assert (envelope.steps, envelope.false_steps, envelope.contradicted) == (0, 1, 3)
+    assert envelope.estimate == before
+    estimate = envelope.solve(10.8)
+    assert abs(estimate.offset_s - 1.0) < 1e-5
+    assert estimate.bound_s < 5e-5
+
+
+def test_a_step_is_true_once_more_records_confirm_it():
+    envelope = settled()
+    bounds_s = []
+    for i in range(30):
+        exchange(envelope, 10.0 + i / 5, 0.995, 1e-5, 1e-5)
+        estimate = envelope.solve(10.0 + i / 5)
+        bounds_s.append(estimate.bound_s)
+        if i > 3:
+            assert abs(estimate.offset_s - 0.995) < 2e-5
+    assert bounds_s[4] > 0.005, "it may still be false"
+    assert bounds_s[-1] < 1e-4
+    assert (envelope.steps, envelope.false_steps, envelope.contradicted) == (1, 0, 0)
+
+
+def test_the_bound_covers_a_small_contradiction_until_it_is_refuted():
+    envelope = settled()
+    bound_s = envelope.estimate.bound_s
+    heard(envelope, 10.0, 0.9997)
+    doubted_s = envelope.solve(10.0).bound_s
+    assert bound_s + 5e-4 < doubted_s < bound_s + 6e-4, "twice as much as it is early"
+    was_heard(envelope, 10.1, 1.0)
+    assert envelope.solve(10.1).bound_s == pytest.approx(bound_s, rel=0.1)
