@@ -118,7 +118,11 @@ TEXTS = {
         "The same time stamps through clock filters: five exchanges a second, a tenth lost each"
         " way, queues of up to 20 ms; errors at 60 s, rms of 40 runs. Scenarios: A is idle 40 %"
         " of the time; B is busy one way; C never idle and lopsided; D never idle; J is D with "
-        "1 ms of jitter; L is busy and idle by turns."
+        "1 ms of jitter; L is busy and idle by turns. Rows `rms_us_...` after `bound_holds_pct`: "
+        "the difference of the two clocks' rates moves, or stamps are wrong; queues as in A. Errors"
+        " count from 130 s on, when the paper's filter has converged. `held_pct` is the share of "
+        "looks in which the error is within the reported bound. The 5 s after a jump of a clock or "
+        "of its rate are left out. `by_sample`: stamps by samples at 5 Msps, no queue."
     ),
     "latency": (
         "The assessment of the Sensors 2023 paper as an emulation: 115 bytes 200 times a second"
