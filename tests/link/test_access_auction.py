@@ -237,3 +237,25 @@ def test_whatever_is_heard_slots_are_sound(given_events):
                 access.told(waiting, slot.start)
                 access.sent(slot.start + SHORT_S, None)
     assert access.state
+
+
+def test_who_takes_no_part_is_told_of():
+    access = make_access(params("auction", [1, 2, 3]), 1, FAST, LONGEST_S, Random(1))
+    for n in range(40):
+        for pdu in range(3):
+            access.heard(2, 0.1 * n, False)
+            if not pdu:
+                access.take_want(Want(2, 3, 0, 0, 5, 0), 0.1 * n)
+        access.heard(3, 0.1 * n + 0.05, False)
+    (notice,) = access.notices(4.0)
+    assert notice.startswith("robot 3 takes no part in the auction")
+    assert access.notices(100.0) == []
+
+
+@pytest.mark.parametrize("policy", ["none", "csma", "minislot"])
+def test_others_tell_of_who_takes_part(policy):
+    """Robot 2 does, and this robot uses another policy. With tdma, it lacks a schedule."""
+    access = make_access(params(policy, [1, 2]), 1, FAST, LONGEST_S, Random(1))
+    assert not [each for each in access.notices(1.0) if "auction" in each]
+    access.bids(2, 1.0)
+    assert [each for each in access.notices(2.0) if "robot 2 takes part in an auction" in each]

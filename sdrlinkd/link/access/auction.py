@@ -19,6 +19,7 @@ from sdrlinkd.link.access.contest import Contest, n_bits
 from sdrlinkd.link.access.known_wants import KnownWants
 from sdrlinkd.link.access.mini_rounds import DRIFT, QUIET, ROUNDING_S, MiniRounds, Place, is_near
 from sdrlinkd.link.access.requests import Waiting, waiting_of
+from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.traits import Sensed
 from sdrlinkd.wire import Want
@@ -30,6 +31,8 @@ FRUITLESS = 2
 """Rounds with pulses and without a burst from which the pulses count as interference."""
 DISTURBED_S = 1.0
 """Time in s for which pulses are not used after interference."""
+MUTE = 20
+"""Bursts in sequence without a WANT from which a robot takes no part. Repeats have none."""
 PAUSE_S = 0.05
 """Time in s without a query after which a robot had nothing to send meanwhile."""
 
@@ -68,6 +71,8 @@ class Auction(BusyChannel):
         self._fruitless = 0
         self._disturbed_until = -inf
         self._is_disturbed = False
+        self._mute = Sightings()
+        """Robots whose bursts do not tell what they want."""
         self._asked = 0, 0.0
         """Since when we want to send, as (count of bursts then, time of the last query)."""
 
@@ -134,6 +139,7 @@ class Auction(BusyChannel):
         """Take what a robot told in a burst at `at`."""
         self._wants.told(want.node, waiting_of(want), at)
         self._told_at = max(self._told_at, at)
+        self._mute.clear(want.node)
 
     def sent(self, end: float, src: int | None) -> None:
         """Remember our own burst, which we do not hear."""
@@ -153,8 +159,17 @@ class Auction(BusyChannel):
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """Remember who was on the air."""
-        if not is_relayed:
-            self._wants.on_air(src, at)
+        if not is_relayed and self._wants.on_air(src, at):
+            self._mute.add(src, at)
+
+    def notices(self, now: float) -> list[str]:
+        """Sentences on robots that use another access policy."""
+        mute = [
+            f"robot {src} takes no part in the auction and this robot does: their bursts collide; "
+            "give both the same [access]"
+            for src in self._mute.lately(now, MUTE)
+        ]
+        return super().notices(now) + mute
 
     def _look(self, sensed: Sensed) -> None:
         """Note what has ended since the last time: a burst that told something, or not."""

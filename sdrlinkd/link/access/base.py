@@ -124,6 +124,9 @@ class Access(Protocol):
     def beacon(self, src: int, at: float) -> None:
         """Note a beacon that came at `at` directly from robot `src`."""
 
+    def bids(self, src: int, at: float) -> None:
+        """Note that robot `src` told at `at` what it wants next, as with an auction."""
+
     def frame(self, start: float) -> Frame | None:
         """The schedule to announce in a burst that leaves at `start`; None: none is kept."""
 
@@ -162,6 +165,8 @@ class BusyChannel:
         """Ends of our last bursts, ascending; some may not have left yet."""
         self._scheduled = Sightings()
         """Robots that announce a schedule."""
+        self._bidding = Sightings()
+        """Robots that take part in an auction."""
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # not all ask for it
         """Mean time in s from an idle channel to a burst of class `qos`: 0."""
@@ -189,6 +194,10 @@ class BusyChannel:
     def beacon(self, src: int, at: float) -> None:
         """Ignore beacons, as no turn depends on them."""
 
+    def bids(self, src: int, at: float) -> None:
+        """Remember that robot `src` takes part in an auction and so uses another policy."""
+        self._bidding.add(src, at)
+
     def frame(self, start: float) -> Frame | None:
         """The schedule to announce: None, as no schedule is kept."""
 
@@ -198,10 +207,15 @@ class BusyChannel:
 
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that use another access policy."""
+        others = {
+            "keeps a schedule": self._scheduled.lately(now),
+            "takes part in an auction": self._bidding.lately(now),
+        }
         return [
-            f"robot {src} keeps a schedule and this robot does not: their bursts collide; "
-            "give both the same [access], and radios of one kind where access.policy is auto"
-            for src in self._scheduled.lately(now)
+            f"robot {src} {what} and this robot does not: their bursts collide; give both the same "
+            "[access], and radios of one kind where access.policy is auto"
+            for what, robots in others.items()
+            for src in robots
         ]
 
     @property

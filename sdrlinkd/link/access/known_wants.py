@@ -40,12 +40,14 @@ class KnownWants:
         self._began_at: float | None = None
         """Time of the first burst."""
 
-    def on_air(self, node: int, at: float) -> None:
-        """Note a burst of a robot that began at `at`."""
+    def on_air(self, node: int, at: float) -> bool:
+        """Note a burst of a robot that began at `at`; returns whether it is a new one."""
         self._begin(at)
-        if node in self._nodes and at > self._on_air_at.get(node, -inf):
-            self._on_air_at[node] = at
-            self.n_bursts += 1
+        if node not in self._nodes or at <= self._on_air_at.get(node, -inf):
+            return False
+        self._on_air_at[node] = at
+        self.n_bursts += 1
+        return True
 
     def told(self, node: int, waiting: Waiting | None, at: float) -> None:
         """Note what a robot told in a burst that began at `at`; None: it wants nothing."""

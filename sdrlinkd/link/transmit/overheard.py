@@ -73,7 +73,8 @@ class Overheard:
         elif self._by_auction is not None and isinstance(record, Want):
             self._by_auction.take_want(record, at)
         elif self._by_request is None:
-            return
+            if isinstance(record, Want):
+                self._access.bids(src, at)
         elif isinstance(record, Grant):
             self._by_request.take_grant(src, record, at)
         elif isinstance(record, Want):
