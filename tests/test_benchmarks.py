@@ -60,7 +60,7 @@ ROWS = {
         "grant_halfduplex_50ms_urgent_p99_over_frame_request",
         "reroute_s", "reroute_to_all_s",
         "urgent_p99_ms_8", "urgent_p99_ms_24", "carried_mbps_8", "carried_mbps_24",
-        "default_over_bulk_max_ms_8",
+        "default_over_bulk_max_ms_8", "control_airtime_pct_8", "control_airtime_pct_24",
         *(f"rtwmp_table{n}_laser_{each}" for n in (1, 3) for each in ("ms", "std_ms", "mdr_pct")),
         *(
             f"rtwmp_table{n}_image_{each}"

@@ -68,7 +68,10 @@ def wait_beside(
     pairs = list(combinations(ids, 2))
     team = Team(ids, pairs, flows, seed, policy, PDU_SIZE, modem=MODEM)
     end_s = BEGIN_S + duration_s
+    team.simulation.run(BEGIN_S)
+    before_s = team.control_s()
     team.simulation.run(end_s)
+    control = (team.control_s() - before_s) / duration_s
     probe, *filling = team.heard
     carried = sum(
         8 * each.flow.size for each in filling for at in each.at.values() if BEGIN_S < at <= end_s
@@ -78,4 +81,4 @@ def wait_beside(
     delays_s = [at - probe.sent_at[number] for number, at in probe.at.items() if number in sent]
     mbps = 1e-6 * carried / duration_s
     mdr = len(delays_s) / len(sent)
-    return Waited(delays_s, mdr, len(sent), mbps, team.control_share())
+    return Waited(delays_s, mdr, len(sent), mbps, control)

@@ -11,6 +11,7 @@ OURS: Policy = "auction"
 PEERS: tuple[Policy, ...] = ("minislot", "tdma", "grant")
 URGENT_OVER: tuple[Class, ...] = ("bulk", "latency")
 P99_MS, CARRIED_MBPS = {8: 8.5, 24: 10.5}, {8: 4.5, 24: 4.2}
+CONTROL_PCT = {8: 3.0, 24: 5.0}
 DEFAULT_MS = 9.5
 
 Case = tuple[Policy, int, Class, Class, int, float]
@@ -51,6 +52,15 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
             peers={policy: _mbps(of[policy]) for policy in peers},
             note="payload that came, in the runs of the row above; the worse one",
         )  # fmt: skip
+        yield Row(
+            f"control_airtime_pct_{n}", _control_pct(of[OURS]), "%", CONTROL_PCT[n], "less",
+            sum(each.n for each in of[OURS]),
+            peers={policy: _control_pct(of[policy]) for policy in peers},
+            note=(
+                "PDUs that hold only records, and pulses, in these runs; the worse one; records "
+                "in PDUs with messages are not counted"
+            ),
+        )  # fmt: skip
     default = {policy: found[policy, 8, "bulk", "default", seed, lengths_s[8]]
                for policy in (OURS, *peers)}  # fmt: skip
     yield Row(
@@ -66,6 +76,10 @@ def _run(case: Case) -> Waited:
 
 def _p99_ms(runs: list[Waited]) -> float:
     return 1e3 * max(each.p99_s for each in runs)
+
+
+def _control_pct(runs: list[Waited]) -> float:
+    return 100 * max(each.control for each in runs)
 
 
 def _mbps(runs: list[Waited]) -> float:

@@ -142,10 +142,13 @@ class Team:
         """What a robot repeated and asked for."""
         return self._report(node).repeats
 
+    def control_s(self) -> float:
+        """Airtime in s of all PDUs that hold only records, and of pulses, so far."""
+        return sum(self._report(node).control_airtime_s for node in self.ids)
+
     def control_share(self) -> float:
-        """Airtime of all PDUs that hold only records, as a share of the time so far."""
-        used_s = sum(self._report(node).control_airtime_s for node in self.ids)
-        return used_s / self.simulation.now
+        """The same, as a share of the time so far."""
+        return self.control_s() / self.simulation.now
 
     def _report(self, node: int) -> LinkReport:
         return self.simulation.stations[node].link.report(self.simulation.now)
