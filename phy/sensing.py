@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy import compute
+from phy.sizes import SENSE_WINDOW
 from phy.stream import LARGEST_SAMPLE
 from phy.tables.sensing import (
     BUSY_UNTIL,
@@ -67,7 +68,8 @@ class EnergyDetector:
         state, n = self._state, int(self._state[N_SHORT])
         found = [int(state[SHORT + i % MOST_SHORT]) for i in range(max(0, n - MOST_SHORT), n)]
         length = state[BUSY_UNTIL] - state[RUN_FROM]
-        if LEAST_PULSE <= length <= MOST_PULSE and state[NEXT] > state[BUSY_UNTIL]:
+        is_over = state[NEXT] >= state[BUSY_UNTIL] + SENSE_WINDOW
+        if LEAST_PULSE <= length <= MOST_PULSE and is_over:
             found.append(int(state[RUN_FROM]))
         return found
 

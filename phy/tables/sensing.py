@@ -13,8 +13,9 @@ POWERS = SHORT + MOST_SHORT
 N_STATE = POWERS + SENSE_WINDOW
 APART = 4 * SENSE_WINDOW
 """Samples without energy that end a run."""
-LEAST_PULSE, MOST_PULSE = 2 * SENSE_WINDOW, 5 * SENSE_WINDOW
-"""Length of the runs that a pulse of N_PULSE samples makes."""
+LEAST_PULSE, MOST_PULSE = 2 * SENSE_WINDOW, 8 * SENSE_WINDOW
+"""Length of the runs that pulses of N_PULSE samples make. Those of several robots in one mini-slot
+overlap, as clocks drift. The shortest burst has 568 samples."""
 
 LEAST_FLOOR = 1e-12
 """The floor is at least this."""

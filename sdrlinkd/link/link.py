@@ -8,7 +8,7 @@ import msgspec
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link.access import LEAST_ROOM, AccessParams
+from sdrlinkd.link.access import LEAST_BID_ROOM, LEAST_ROOM, AccessParams
 from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos
@@ -205,19 +205,18 @@ class Link:
     def attach(self, traits: PduLinkTraits, access: AccessParams, rate: RateParams) -> Fit:
         """Fit the link to a radio that is up. Raises ConfigError and then changes nothing."""
         fit = fit_to(traits, access, rate, self.own_id, self._rng)
-        access_is = fit.settled.access
-        asks = access_is.by_request is not None or access_is.by_auction is not None
-        if asks and not self.registry.has_control:
+        policy, asks = fit.settled.policy, {"grant": LEAST_ROOM, "auction": LEAST_BID_ROOM}
+        missing = asks.get(policy, 0) - self._composer.k_whole
+        if policy in asks and not self.registry.has_control:
             raise ConfigError(
-                f'access.policy: got "{fit.settled.policy}", which tells what waits in records; '
-                "16 topics in the registry leave no number for them: allowed are 15"
+                f'access.policy: got "{policy}", which tells what waits in records; 16 topics in '
+                "the registry leave no number for them: allowed are 15"
             )
-        missing = LEAST_ROOM - self._composer.k_single
-        if fit.settled.policy == "grant" and missing > 0:
+        if missing > 0:
             size = self._clear_size
             raise ConfigError(
-                f'link.pdu_size: got {size}; allowed with access.policy = "grant": at least '
-                f"{size + missing}, so that a PDU holds a plan and a request"
+                f'link.pdu_size: got {size}; allowed with access.policy = "{policy}": at least '
+                f"{size + missing}, so that a PDU has room for its records"
             )
         self._team = frozenset(access.nodes)
         self.use(fit)

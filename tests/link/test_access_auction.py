@@ -186,19 +186,110 @@ def test_it_needs_pulses_and_a_place_in_the_list():
 
 
 def test_a_pulse_that_does_not_leave_ends_our_part_in_the_contest():
+    """Robot 2 challenges, too, and would lose. Without our pulses it wins, so we are silent."""
+    for has_left in (True, False):
+        access = make_access(params("auction", [1, 2]), 1, FAST, LONGEST_S, Random(1))
+        now, pulses, starts = 1.0, [], []
+        while now < 1.0 + 2 * access.round_s and not (starts and not starts[-1].is_pulse):
+            sensed = Sensed(now, 0.5, None, 0.5, None, tuple(pulses))
+            slot = access.slot(Wish(now + FAST.lead_s, Qos.URGENT, SHORT_S, sensed))
+            if slot is not None:
+                starts.append(slot)
+                if not pulses:
+                    pulses.append(slot.start + 1e-5)
+                now = slot.start + 1e-4
+                if len(starts) == 1 and not has_left:
+                    access.not_sent(slot.start)
+            now += 1e-4
+        end = starts[0].start + access.round_s - 1e-4
+        kinds = [each.is_pulse for each in starts if each.start < end]
+        assert kinds == ([True, True, True, True, False] if has_left else [True])
+
+
+def test_a_mini_slot_that_was_missed_ends_our_part_too():
+    """A host may stand still. The others then know nothing of our bit."""
+    for seed in range(3):
+        air = make_air(4, seed)
+        air.saturate(200, qos=Qos.BULK)
+        air.offer_randomly(3.0, per_s=20, classes=(Qos.URGENT, Qos.DEFAULT))
+        chance, decide = Random(seed), air._decide
+
+        def stalls(t, node, chance=chance, decide=decide):
+            if chance.random() > 0.02:
+                decide(t, node)
+
+        air._decide = stalls
+        assert len(air.run(3.0)) > 300
+        air.assert_nobody_clashes(SETTLED_S)
+
+
+def test_what_was_told_and_is_gone_is_not_sent_for_later():
+    """Its robot was next, but had nothing. Later it has something again."""
+    for seed in range(4):
+        air = make_air(4, seed)
+        air.saturate(400, qos=Qos.BULK)
+        for k in range(30):
+            at = SETTLED_S + 0.1 * k + air.rng.uniform(0, 0.02)
+            air.offer(3, at, Qos.DEFAULT, SHORT_S)
+            air.offer(3, at, Qos.DEFAULT, SHORT_S)
+            air._schedule(at + 0.012, lambda t, node: node.waiting.clear(), air.nodes[3])
+        air.run(SETTLED_S + 3.2)
+        air.assert_nobody_clashes()
+
+
+def test_something_urgent_of_a_robot_with_bulk_waits_for_nobodys_default():
+    n = 8
+    air = make_air(n, 6)
+    air.saturate(300, qos=Qos.BULK)
+    air.offer_randomly(SETTLED_S + 3, per_s=10, classes=(Qos.DEFAULT,), begin_s=SETTLED_S)
+    send_at_random(air, 0, Qos.URGENT, SETTLED_S + 3)
+    air.run(SETTLED_S + 3.2)
+    waits = waits_of(air, Qos.URGENT)
+    assert len(waits) > 30
+    # A contest for something of class default may just have begun.
+    assert max(waits) <= bound_s(n) + air.nodes[0].access.round_s + LONGEST_S
+
+
+@pytest.mark.parametrize("most", [Qos.LATENCY, Qos.DEFAULT])
+def test_nobody_waits_for_ever(most):
+    air = make_air(4, 7)
+    for _ in range(900):
+        for node in (0, 3):
+            air.offer(node, 0.0, most)
+    for node in (1, 2):
+        air.offer(node, SETTLED_S, Qos.BULK, SHORT_S)
+    air.run(SETTLED_S + 4)
+    assert len(waits_of(air, Qos.BULK, SETTLED_S - 0.1)) == 2
+    air.assert_nobody_clashes()
+
+
+@pytest.mark.parametrize(("priority", "challenges"), [(10, False), (64, False), (100, True)])
+def test_priority_counts_in_a_class(priority, challenges):
     access = make_access(params("auction", [1, 2]), 1, FAST, LONGEST_S, Random(1))
-    now, pulses = 1.0, []
-    while len(pulses) < 2:
-        sensed = Sensed(now, 0.5, None, 0.5, None)
-        slot = access.slot(Wish(now + FAST.lead_s, Qos.URGENT, SHORT_S, sensed))
-        if slot is not None:
-            assert slot.is_pulse
-            pulses.append(slot.start)
-            now = slot.start + 1e-4
-            access.not_sent(slot.start)
+    access.heard(2, 0.99, False)
+    access.take_want(Want(2, Qos.DEFAULT, 64, 0, 9, 0), 0.99)
+    now, first = 1.0, None
+    while first is None and now < 1.01:
+        sensed = Sensed(now, 1.0, 0.99, 1.0, 0.99)
+        waiting = Waiting(Qos.DEFAULT, priority, 0.0, 0.0)
+        first = access.slot(Wish(now + FAST.lead_s, Qos.DEFAULT, SHORT_S, sensed, waiting))
         now += 1e-4
-    # In the next round, as nobody has challenged in this one.
-    assert pulses[1] == pytest.approx(pulses[0] + access.pause_s, abs=1e-4)
+    assert first.is_pulse
+    # Otherwise it waits for the second round, as robot 2 did not send.
+    assert (first.start < 1.0 + access.pause_s) == challenges
+
+
+def test_a_burst_that_does_not_leave_was_none():
+    """As if it had never been: the others have heard nothing."""
+    access = make_access(params("auction", [1, 2]), 1, FAST, LONGEST_S, Random(1))
+    access.heard(2, 0.9, False)
+    before = access._wants.in_order(), access._wants.n_bursts
+    access.told(Waiting(Qos.BULK, 0, 0.0, 1.0), 1.0)
+    access.sent(1.1, None)
+    access.not_sent(1.0)
+    assert (access._wants.in_order(), access._wants.n_bursts) == before
+    assert access._wants.first(1.0) is None
+    assert access.own_end < 1.0
 
 
 times = st.floats(0, 3)

@@ -1,14 +1,25 @@
 """Where the air goes by auction, the first PDU of each burst tells what its robot wants next."""
 
+from typing import NamedTuple
+
+import msgspec
 import pytest
 
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link import Opportunity, Outcome, Overrides, Qos, RateParams, Sensed
+from sdrlinkd.link import ClassesParams, Opportunity, Outcome, Overrides, Qos, RateParams, Sensed
 from sdrlinkd.link.access import waiting_of
 from sdrlinkd.wire import Want, parse
 from tests.link.pulsing import FAST
 from tests.link.radios import params
-from tests.link.world import make_link, records_in
+from tests.link.world import make_link, records_in, tell
+
+
+class NamedBurst(NamedTuple):
+    """A burst of which only times are known."""
+
+    start: float
+    airtime_s: float
+
 
 PDU_S = 0.0005
 SIZE = 256
@@ -139,3 +150,33 @@ def test_without_records_there_is_no_auction():
     link = make_link(1, topics=topics, pdu_size=SIZE)
     with pytest.raises(ConfigError, match="16 topics"):
         link.attach(RADIO, params("auction", [1, 2]), RateParams())
+
+
+def test_nobody_speaks_for_another_robot():
+    """Robot 2 says that robot 1 wants something urgent, and robot 3 has something urgent."""
+    waits = []
+    for node in (1, 2):
+        link = make(3)
+        tell(link, 2, Want(node, Qos.URGENT, 127, 0, 50, 0), at=1.0)
+        link.submit(0, bytes(20), 1.0, Overrides(qos=Qos.URGENT))
+        burst = NamedBurst(1.0 - PDU_S, PDU_S)
+        waits.append(wait_after(link, burst))
+    assert waits[0] < waits[1]
+
+
+@pytest.mark.parametrize("size", [32, 36, 48, 51])
+def test_a_pdu_has_room_for_a_want_and_a_message(size):
+    with pytest.raises(ConfigError, match=r"link\.pdu_size: got .* at least 52"):
+        make_link(1, pdu_size=size).attach(RADIO, params("auction", [1, 2]), RateParams())
+
+
+def test_small_pdus_with_parity_carry_all():
+    classes = msgspec.convert({"bulk": {"parity": 0.3}}, ClassesParams)
+    link, other = make_link(1, pdu_size=52, classes=classes), make_link(2, pdu_size=52)
+    link.attach(RADIO, params("auction", [1, 2]), RateParams())
+    link.submit(0, bytes(900), 1.0, Overrides(qos=Qos.BULK))
+    got = []
+    for burst in bursts_of(link, seconds=2.0):
+        for pdu in burst.pdus:
+            got += other.hear(pdu, burst.start, 20.0, burst.start + burst.airtime_s)
+    assert [len(each.payload) for each in got] == [900]

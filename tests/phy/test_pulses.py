@@ -54,16 +54,30 @@ def test_a_burst_is_a_carrier_and_no_pulse():
     assert abs(sense.carrier_until - REST - len(burst)) < 2 * WINDOW
 
 
-def test_a_burst_that_begins_is_told_from_a_pulse_in_time():
-    """Until it is as long as a pulse, it is neither; a pulse counts once it is over."""
+@pytest.mark.parametrize("chunk", [1, 40, 64, 100])
+def test_a_burst_that_begins_is_never_taken_for_a_pulse(chunk):
     draws = rng()
     burst = Transmitter().modulate(payloads(draws, 3, 220), 1)
+    x = noisy(draws, np.concatenate((silence(REST), burst[:2000])), 15)
     sense = EnergyDetector()
-    sense.push(noisy(draws, np.concatenate((silence(REST), burst[: 4 * WINDOW])), 15))
-    assert sense.pulses == []
-    sense.push(noisy(draws, burst[4 * WINDOW :], 15))
-    assert sense.pulses == []
+    for at in range(0, len(x), chunk):
+        sense.push(x[at : at + chunk])
+        assert sense.pulses == []
     assert sense.carrier_until > REST
+
+
+@pytest.mark.parametrize("apart", [0, 50, 128, 300])
+def test_pulses_of_two_robots_in_one_mini_slot_are_one(apart):
+    """Their clocks drift while nobody sends."""
+    draws = rng()
+    x = np.zeros(2 * REST + N_PULSE + apart, np.complex64)
+    x[REST : REST + N_PULSE] += pulse()
+    x[REST + apart : REST + apart + N_PULSE] += pulse() * np.exp(1j)
+    sense = EnergyDetector()
+    sense.push(noisy(draws, x, 15))
+    (found,) = sense.pulses
+    assert abs(found - REST) < WINDOW
+    assert sense.carrier_until == 0
 
 
 def test_noise_alone_has_none():

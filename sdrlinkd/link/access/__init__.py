@@ -4,7 +4,7 @@ This package holds the access policies, each a state machine over the link's clo
 that fits the radio. It never reads a message, and decides only when to send.
 """
 
-from sdrlinkd.link.access.auction import Auction
+from sdrlinkd.link.access.auction import LEAST_BID_ROOM, Auction
 from sdrlinkd.link.access.auto import Settled, may_share, percent, settle
 from sdrlinkd.link.access.base import Access, Slot, Wish
 from sdrlinkd.link.access.by_auction import ByAuction
@@ -40,6 +40,7 @@ __all__ = [
     "CSMA_STEPS",
     "CSMA_WINDOWS",
     "FORGET_S",
+    "LEAST_BID_ROOM",
     "LEAST_ROOM",
     "LEVELS",
     "LISTEN_S",

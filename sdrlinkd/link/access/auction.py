@@ -22,17 +22,22 @@ from sdrlinkd.link.access.requests import Waiting, waiting_of
 from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.traits import Sensed
-from sdrlinkd.wire import Want
+from sdrlinkd.wire import WANT_SIZE, Want
 
 PATIENCE = 8
 """Bursts of others after which a robot that could not tell what it wants challenges, and wins
 against those that have not waited for so long."""
+STARVED = 200
+"""Bursts of others after which a robot challenges whatever it has, unless something urgent is next,
+and takes part in the contest with class latency at least."""
 FRUITLESS = 2
 """Rounds with pulses and without a burst from which the pulses count as interference."""
 DISTURBED_S = 1.0
 """Time in s for which pulses are not used after interference."""
 MUTE = 20
 """Bursts in sequence without a WANT from which a robot takes no part. Repeats have none."""
+LEAST_BID_ROOM = WANT_SIZE + 32
+"""Octets for an entry that a PDU must have: for a WANT, and for a part of a message."""
 PAUSE_S = 0.05
 """Time in s without a query after which a robot had nothing to send meanwhile."""
 
@@ -73,8 +78,12 @@ class Auction(BusyChannel):
         self._is_disturbed = False
         self._mute = Sightings()
         """Robots whose bursts do not tell what they want."""
+        self._seen_bursts = 0
+        """The count of bursts when we last looked."""
         self._asked = 0, 0.0
         """Since when we want to send, as (count of bursts then, time of the last query)."""
+        self._before = self._asked, -inf
+        """That, and when we were on the air, before our last burst."""
 
     @property
     def by_auction(self) -> ByAuction:
@@ -114,17 +123,23 @@ class Auction(BusyChannel):
         if self._is_disturbed:
             return self._in_turn(wish, carrier_end)
         rounds = self._rounds
+        has_seen = rounds.knows(carrier_end)
         place = rounds.place(carrier_end, earliest, (*sensed.pulses, *self._pulses))
         drift_s = (place.width_s - self._minislot_s) / 2
         if place.start > sensed.until + place.width_s - drift_s - self._detect_s:
             return None
+        n_unseen = self._wants.n_bursts - self._seen_bursts
+        self._seen_bursts = self._wants.n_bursts
+        if n_unseen > 1 or (not has_seen and place.n_before):
+            # A hand-over has passed in which we may have been next.
+            self._wants.told(self._own_id, None, earliest)
         if rounds.go_on(place, carrier_end):
-            self._nobody_came(place.begin)
+            self._nobody_came(place.begin, carrier_end)
         self._count_fruitless(place)
         if place.number == 0:
             return self._challenge(wish, place)
         if not place.is_contested:
-            first = self._wants.first(earliest)
+            first = self._wants.first(carrier_end)
             is_next = first is not None and first.node == self._own_id
             if place.is_first and is_next and not self._wants.is_unsure(self._own_id, earliest):
                 return self._burst(wish, place.start)
@@ -144,6 +159,8 @@ class Auction(BusyChannel):
     def sent(self, end: float, src: int | None) -> None:
         """Remember our own burst, which we do not hear."""
         super().sent(end, src)
+        # Told by its end, as its begin is not known; no other burst is in between.
+        self._before = self._asked, self._wants.silent_since(self._own_id)
         self._wants.on_air(self._own_id, end)
         self._contest, self._fruitless = None, 0
         self._asked = self._wants.n_bursts, end
@@ -155,7 +172,9 @@ class Auction(BusyChannel):
             self._contest = None
         else:
             super().not_sent(start)
-            self._wants.told(self._own_id, None, start)
+            # The others have heard nothing, and may have given us up.
+            self._asked, silent_since = self._before
+            self._wants.take_back(self._own_id, silent_since)
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """Remember who was on the air."""
@@ -185,13 +204,13 @@ class Auction(BusyChannel):
         if self._fruitless >= FRUITLESS:
             self._disturbed_until, self._fruitless = place.start + DISTURBED_S, 0
 
-    def _nobody_came(self, now: float) -> None:
+    def _nobody_came(self, now: float, since: float) -> None:
         """Forget what the robot wants that was to send next, as it did not.
 
         If we have missed a burst, that may be what we want.
         """
         wants = self._wants
-        first = wants.first(now)
+        first = wants.first(since)
         if wants.is_unsure(self._own_id, now):
             wants.told(self._own_id, None, now)
         elif first is not None:
@@ -201,21 +220,24 @@ class Auction(BusyChannel):
         """A pulse in the first mini-slot of a round, if we have reason for it."""
         if not self._challenges(wish, place):
             return None
-        n, has_waited = len(self._nodes), self._has_waited
-        contest = Contest(wish.qos, self._rank, n, has_waited=has_waited)
+        qos = min(wish.qos, Qos.LATENCY) if self._has_waited(STARVED) else wish.qos
+        has_waited = self._has_waited(PATIENCE)
+        contest = Contest(qos, self._rank, len(self._nodes), has_waited=has_waited)
         self._contest = place.begin, contest
         return self._pulse(place.start)
 
     def _challenges(self, wish: Wish, place: Place) -> bool:
-        now, wants = wish.earliest, self._wants
+        now, wants, since = wish.earliest, self._wants, place.idle_since
         priority = 0 if wish.waiting is None else wish.waiting.priority
-        first = wants.first(now) if place.is_first else None
-        if first is not None and first.node == self._own_id:
-            return wants.is_unsure(self._own_id, now)
+        first = wants.first(since) if place.is_first else None
         if first is None or not first.is_before(wish.qos, priority):
             return True
-        is_unknown = wants.of(self._own_id, now) is None
-        return wish.qos <= first.qos and is_unknown and self._has_waited
+        if first.node == self._own_id:
+            return wants.is_unsure(self._own_id, now)
+        if first.qos > Qos.URGENT and self._has_waited(STARVED):
+            return True
+        is_unknown = wants.of(self._own_id, since) is None
+        return wish.qos <= first.qos and is_unknown and self._has_waited(PATIENCE)
 
     def _in_contest(self, wish: Wish, place: Place, pulses: Sequence[float]) -> Slot | None:
         """What we do in a round with a challenge."""
@@ -223,17 +245,20 @@ class Auction(BusyChannel):
             return None
         contest = self._contest[1]
         for bit in range(place.number - 1):
-            if is_near(place.at(1 + bit), place.width_s, pulses):
+            at = place.at(1 + bit)
+            if is_near(at, place.width_s, pulses):
                 contest.heard(bit)
+            if contest.pulses(bit) and not is_near(at, place.width_s, self._pulses):
+                # We have missed that mini-slot, so the others know nothing of us.
+                contest.is_in = False
         if place.number <= self._n_bits:
             return self._pulse(place.start) if contest.pulses(place.number - 1) else None
         if not contest.is_in:
             return None
         return self._burst(wish, place.start)
 
-    @property
-    def _has_waited(self) -> bool:
-        return self._wants.n_bursts >= self._asked[0] + PATIENCE
+    def _has_waited(self, n_bursts: int) -> bool:
+        return self._wants.n_bursts >= self._asked[0] + n_bursts
 
     def _burst(self, wish: Wish, start: float) -> Slot:
         # What comes with the first message is not less urgent, or others should have the air.

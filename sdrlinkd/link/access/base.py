@@ -40,7 +40,7 @@ class Wish(NamedTuple):
     """A request to send a burst of class `qos`, at least `need_s` long, at `earliest` or later.
 
     Where turns are given by request, `waiting` is all that waits, and `dues` are the next messages
-    that the team expects, for the robot that plans.
+    that the team expects, for the robot that plans. In an auction, `waiting` has the priority.
     """
 
     earliest: float

@@ -31,7 +31,7 @@ def _why_idle(settled: Settled) -> str:
     if settled.policy == "auction":
         return (
             f"auction needs {1e3 * access.pause_s:.3g} ms after every burst on this radio, and "
-            f"{1e3 * access.round_s:.3g} ms more for a contest"
+            f"{1e3 * access.round_s:.3g} ms with a contest"
         )
     if settled.policy == "csma":
         waits = f"csma waits at least {1e3 * access.pause_s:.3g} ms after every burst"

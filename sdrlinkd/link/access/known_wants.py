@@ -33,7 +33,7 @@ class KnownWants:
         self._nodes = frozenset(nodes)
         self._wanted: dict[int, Wanted] = {}
         self._on_air_at: dict[int, float] = {}
-        """When each robot's last burst began."""
+        """When each robot was on the air last."""
         self.n_bursts = 0
         """Count of bursts so far."""
         self._missed_at = -inf
@@ -41,13 +41,26 @@ class KnownWants:
         """Time of the first burst."""
 
     def on_air(self, node: int, at: float) -> bool:
-        """Note a burst of a robot that began at `at`; returns whether it is a new one."""
+        """Note a burst of a robot at `at`; returns whether it is a new one.
+
+        `at` is when it began or, for one of our own, when it ends.
+        """
         self._begin(at)
         if node not in self._nodes or at <= self._on_air_at.get(node, -inf):
             return False
         self._on_air_at[node] = at
         self.n_bursts += 1
         return True
+
+    def silent_since(self, node: int) -> float:
+        """When a robot was on the air last."""
+        return self._on_air_at.get(node, -inf)
+
+    def take_back(self, node: int, silent_since: float) -> None:
+        """Note that the last burst of a robot has not left; what it wants is not known."""
+        self._on_air_at[node] = silent_since
+        self.n_bursts -= 1
+        self._wanted.pop(node, None)
 
     def told(self, node: int, waiting: Waiting | None, at: float) -> None:
         """Note what a robot told in a burst that began at `at`; None: it wants nothing."""
@@ -94,5 +107,4 @@ class KnownWants:
             self._began_at = at
 
     def _rank(self, wanted: Wanted) -> tuple[Qos, int, float, int]:
-        silent_since = self._on_air_at.get(wanted.node, -inf)
-        return wanted.qos, -wanted.priority, silent_since, wanted.node
+        return wanted.qos, -wanted.priority, self.silent_since(wanted.node), wanted.node

@@ -20,6 +20,7 @@ ROUNDING_S = 1e-9
 class Place(NamedTuple):
     """A mini-slot: the `number`-th of the round that begins at `begin`, in s."""
 
+    idle_since: float
     begin: float
     width_s: float
     number: int
@@ -58,6 +59,10 @@ class MiniRounds:
         self._is_quiet = False
         """Whether the round, the first one after a burst, is without a challenge so far."""
 
+    def knows(self, idle_since: float) -> bool:
+        """Whether a mini-slot since then has been looked at."""
+        return self._known[0] == idle_since
+
     def place(self, idle_since: float, earliest: float, pulses: Sequence[float]) -> Place:
         """The first mini-slot that begins at `earliest` or later."""
         is_known = self._known[0] == idle_since
@@ -74,7 +79,7 @@ class MiniRounds:
             begin += n * width_s
             n_before += 1
             fruitless += is_contested
-        return Place(at, width_s, number, n_before, is_contested, fruitless)
+        return Place(idle_since, at, width_s, number, n_before, is_contested, fruitless)
 
     def go_on(self, place: Place, idle_since: float) -> bool:
         """Note that all is known before a mini-slot.

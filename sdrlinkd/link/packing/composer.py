@@ -65,8 +65,8 @@ class Composer:
         self._control_entry_id = rng.randrange(256)
         self._patience_s = reassembly_timeout_s
         self.entry_ids = TopicEntryIds(rng, REST_FACTOR * reassembly_timeout_s)
-        self.k_single = equal_payload(params.pdu_size, 1)
-        """Payload bytes of a PDU with one entry."""
+        self.k_single = self.k_whole = equal_payload(params.pdu_size, 1)
+        """Payload bytes of a PDU with one entry, and of one that has no room for a record."""
         self._least_shared = max(equal_payload(params.pdu_size, 2), params.min_fragment)
         self._k_shared = min(self._least_shared, self.k_single)
         parity = {qos: classes.of(qos).parity * has_control for qos in Qos}
@@ -89,6 +89,7 @@ class Composer:
         self.k_single = draft.room
         self._k_shared = min(self._least_shared, self.k_single)
         self._writer.leave_room(self.k_single, self._k_shared)
+        self._flush.size = self.k_single
 
     def fill(
         self, start: float, allowance: Allowance, source: int | None = None, *,
@@ -129,8 +130,7 @@ class Composer:
                 pdu = self._next_pdu(start, first, source, told)
                 if pdu is None and told:
                     # The next fragment was cut before there had to be room for a record.
-                    told = b""
-                    continue
+                    pdu = self._next_pdu(start, first, source, b"")
                 if pdu is None:
                     break
                 told = b"" if pdu.src == self._src else told

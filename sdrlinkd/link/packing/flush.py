@@ -36,7 +36,7 @@ class Flush:
 
     def __init__(self, flush_s: FlushTime, outbox: Outbox, size: int, patience_s: float) -> None:
         self._outbox = outbox
-        self._size = size
+        self.size = size
         self._begun_s = BEGUN_PART * patience_s
         self.is_on = flush_s != NOW
         """Whether messages ever wait."""
@@ -50,9 +50,7 @@ class Flush:
     def must_wait(self, now: float) -> bool:
         """Whether the messages in the outbox, which must not be empty, wait for more."""
         return (
-            self.is_on
-            and now < self.due_at()
-            and self._outbox.pending_bytes(self._size) < self._size
+            self.is_on and now < self.due_at() and self._outbox.pending_bytes(self.size) < self.size
         )
 
     def due_at(self) -> float:

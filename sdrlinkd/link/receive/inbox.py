@@ -147,12 +147,10 @@ class Inbox:
             events.append(PduPlaced(read, track.number, track.skipped, is_wanted, at, is_ours))
         if to_relay is not None:
             events.append(to_relay)
-            if is_relay and not is_ours:
-                return self._drop("rx_relayed", events)
         if not is_ours:
             if not is_relayed:
                 self._records.take_wants(pdu.src, admitted, records, events)
-            return self._drop("rx_not_for_us", events)
+            return self._drop("rx_relayed" if is_relay else "rx_not_for_us", events)
         for record in records:
             if isinstance(record, Beacon | Clock):
                 self._take_boot_id(record.boot_id, neighbor, read, key, at, now, events)

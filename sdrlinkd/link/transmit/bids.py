@@ -37,12 +37,10 @@ class Bids:
         self._composer = composer
         self._own_id = own_id
 
-    def waiting(self, now: float) -> Waiting | None:
-        """The next message, as far as the access policy needs it; None: none waits."""
+    def waiting(self) -> Waiting | None:
+        """Class and priority of the next message; None: none waits."""
         head = self._outbox.next_message
-        if head is None:
-            return None
-        return Waiting(head.qos, head.priority, max(0.0, now - head.arrived_at), 0.0)
+        return None if head is None else Waiting(head.qos, head.priority, 0.0, 0.0)
 
     def after(self, allowance: Allowance, airtime_s: AirtimeOf) -> Bid:
         """What will be left after a burst of as many PDUs as `allowance` has."""
@@ -51,8 +49,8 @@ class Bids:
         return Bid(waiting, want_of(self._own_id, told))
 
     def told(self, bid: Bid, start: float, built: Iterable[BuiltPdu]) -> None:
-        """Note that a burst at `start` of these PDUs tells it, if any of them is ours."""
-        if any(pdu.src == self._own_id for pdu in built):
+        """Note that a burst at `start` of these PDUs tells it, if it does."""
+        if any(bid.octets in pdu.data for pdu in built):
             self._access.told(bid.waiting, start)
 
     def _left(self, allowance: Allowance, airtime_s: AirtimeOf) -> Waiting | None:

@@ -71,7 +71,9 @@ class Overheard:
         elif isinstance(record, Frame):
             self._access.take_frame(src, record, at)
         elif self._by_auction is not None and isinstance(record, Want):
-            self._by_auction.take_want(record, at)
+            # Nobody speaks for others here.
+            if record.node == src:
+                self._by_auction.take_want(record, at)
         elif self._by_request is None:
             if isinstance(record, Want):
                 self._access.bids(src, at)

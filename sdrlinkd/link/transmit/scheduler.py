@@ -163,7 +163,7 @@ class BurstScheduler:
             waiting = turns.waiting(earliest, partial(airtime_s, mcs))
             dues = turns.dues(earliest, partial(airtime_s, mcs))
         elif self._bids is not None:
-            waiting = self._bids.waiting(earliest)
+            waiting = self._bids.waiting()
         slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed, waiting, dues))
         if slot is None:
             return None
@@ -367,8 +367,9 @@ class BurstScheduler:
         """The first burst of the retry queue in a new slot; None if there is no slot yet."""
         again = self._retry.waiting[0]
         airtime_s = opportunity.airtime_s(again.mcs, len(again.pdus))
+        waiting = None if self._bids is None else self._bids.waiting()
         slot = self._access.slot(
-            Wish(opportunity.earliest, again.qos, airtime_s, opportunity.sensed)
+            Wish(opportunity.earliest, again.qos, airtime_s, opportunity.sensed, waiting)
         )
         if slot is None or slot.start + airtime_s > slot.end:
             return None
