@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal, NamedTuple
 
 import msgspec
@@ -10,6 +10,8 @@ from msgspec import Meta
 
 SPEED_OF_LIGHT = 299_792_458.0
 LEAST_DISTANCE_M = 1.0
+
+NEVER_OFF: Mapping[int, Sequence["Outage"]] = {}
 
 Decibel = Annotated[float, Meta(ge=-300, le=300)]
 
@@ -94,7 +96,7 @@ class Track:
 
 
 class World:
-    """The air between all pairs of nodes, at any time."""
+    """The air between all pairs of nodes, at any time; `off`: when the radios of some are off."""
 
     def __init__(
         self,
@@ -102,11 +104,12 @@ class World:
         tracks: dict[int, Track],
         links: Sequence[LinkOverride] = (),
         outages: Sequence[Outage] = (),
+        off: Mapping[int, Sequence[Outage]] = NEVER_OFF,
     ) -> None:
         self._air = air
+        self._off = {node: _Times(times) for node, times in off.items()}
         self._tracks = tracks
-        self._outages = _merged(outages)
-        self._ends = [outage.end_s for outage in self._outages]
+        self._outages = _Times(outages)
         self._links: dict[tuple[int, int], LinkOverride] = {}
         for link in links:
             self._links[link.sender, link.receiver] = link
@@ -115,7 +118,7 @@ class World:
 
     def hop(self, sender: int, receiver: int, t: float) -> Hop | None:
         """The hop from sender to receiver at time `t`; None when nothing arrives."""
-        if self.is_out(t):
+        if self.is_out(t) or self.is_off(sender, t) or self.is_off(receiver, t):
             return None
         link = self._links.get((sender, receiver))
         distance_m, speed = self._distance(sender, receiver, t)
@@ -133,8 +136,12 @@ class World:
 
     def is_out(self, t: float) -> bool:
         """Whether there is an outage at `t`."""
-        i = bisect_right(self._ends, t)
-        return i < len(self._outages) and self._outages[i].begin_s <= t
+        return self._outages.hold(t)
+
+    def is_off(self, node: int, t: float) -> bool:
+        """Whether the radio of a node is off at `t`."""
+        times = self._off.get(node)
+        return times is not None and times.hold(t)
 
     def _distance(self, sender: int, receiver: int, t: float) -> tuple[float, float]:
         """(distance in m, its rate of growth in m/s); 0 if the positions are unknown."""
@@ -144,6 +151,19 @@ class World:
         step_s = 0.01
         now, then = (math.dist(one.at(each), other.at(each)) for each in (t, t + step_s))
         return now, (then - now) / step_s
+
+
+class _Times:
+    """Periods in order, merged where they overlap."""
+
+    def __init__(self, periods: Sequence[Outage]) -> None:
+        self._periods = _merged(periods)
+        self._ends = [each.end_s for each in self._periods]
+
+    def hold(self, t: float) -> bool:
+        """Whether `t` is in one of them."""
+        i = bisect_right(self._ends, t)
+        return i < len(self._periods) and self._periods[i].begin_s <= t
 
 
 def _merged(outages: Sequence[Outage]) -> list[Outage]:

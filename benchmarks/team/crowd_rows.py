@@ -19,7 +19,7 @@ Case = tuple[Policy, int, Class, Class, int, float]
 
 def rows(seed: int, quick: bool) -> Iterator[Row]:
     """Delays of a robot beside others that fill the air, and what all carry meanwhile."""
-    lengths_s = {8: 1.0, 24: 0.5} if quick else {8: 30.0, 24: 8.0}
+    lengths_s = {8: 1.0, 24: 0.5} if quick else {8: 20.0, 24: 6.0}
     peers = ("minislot",) if quick else PEERS
     cases: list[Case] = [
         (policy, n, others, "urgent", seed, length_s)

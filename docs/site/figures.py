@@ -51,6 +51,8 @@ def _demo(out: Path) -> None:
 def _lab(out: Path) -> None:
     _run("lab", "out-and-back", "--out", str(out))
     shutil.copy(out / "lab.png", FIGURES / "out_and_back.png")
+    _run("lab", "mine", "--out", str(out))
+    shutil.copy(out / "lab.png", FIGURES / "mine.png")
 
 
 def _run(*arguments: str) -> None:

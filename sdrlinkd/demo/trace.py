@@ -2,7 +2,7 @@
 
 from collections import defaultdict, deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ class Sample:
     at: float
     payload: bytes
     age_s: float | None = None
+    hops_left: int = 0
+    """Hops that it could still have taken, where it was received."""
 
 
 # A message as sent and as received.
@@ -133,4 +135,4 @@ def _as_on_air(sent: Sample, received: Sample) -> Sample:
     """The reception, with its time on the air if the samples were recorded and played later."""
     if received.age_s is None:
         return received
-    return Sample(sent.at + received.age_s, received.payload)
+    return replace(received, at=sent.at + received.age_s, age_s=None)

@@ -9,6 +9,7 @@ from matplotlib.ticker import LogFormatter
 from phy import MCS_TABLE
 from sdrlinkd.lab.report import LabReport
 from sdrlinkd.lab.scenario import Scenario
+from sdrlinkd.lab.team_pictures import draw_classes, draw_hops
 from sdrlinkd.pictures import COLORS, OURS, QUIET, legend_beside, looks, make_figure, save
 
 MOST_NAMED = 12
@@ -19,7 +20,10 @@ def draw(report: LabReport, scenario: Scenario, path: Path, caption: str) -> Non
     """Draw the PDR in each tenth of the run, latencies, and the MCS between each two robots."""
     distances = _distances(report, scenario)
     adaptive = any(robot.mcs_changes for robot in report.robots)
+    relayed = [pair for pair in report.pairs if pair.hops]
     heights = [2.4, *([1.8] if distances else []), *([2.4] if adaptive else [])]
+    if relayed:
+        heights += [1.8, 2.2, 0.8 + 0.18 * max(4, min(len(relayed), 60))]
     heights.append(0.9 + 0.2 * max(3, min(len(report.pairs), 60)))
     figure, panels = make_figure(
         len(heights), 1, (8.0, sum(heights)), height_ratios=heights
@@ -29,7 +33,10 @@ def draw(report: LabReport, scenario: Scenario, path: Path, caption: str) -> Non
     if distances:
         _draw_distances(over_time[1], distances)
     if adaptive:
-        _mcs(over_time[-1], report)
+        _mcs(over_time[1 + bool(distances)], report)
+    if relayed:
+        draw_classes(over_time[-3], over_time[-2], report)
+        draw_hops(over_time[-1], relayed, report.duration_s)
     for axes in over_time:
         axes.set_xlim(0, report.duration_s)
     over_time[-1].set_xlabel("time in s")

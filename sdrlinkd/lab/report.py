@@ -1,11 +1,12 @@
 """report.json of a lab run: what each robot received from each other, and the airtime it took."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from msgspec import Struct
 
-from sdrlinkd.demo import Pair, Sample, Trace, latency_ms
+from sdrlinkd.demo import Sample, Trace, latency_ms
+from sdrlinkd.lab.over_time import ClassOverTime, Clock, Passage, Values, hops_over_time
 from sdrlinkd.reports import Snapshot
 
 TENTHS = 10
@@ -25,6 +26,9 @@ class PairResult(Struct, frozen=True, kw_only=True):
     bytes_identical: bool
     topics: dict[str, list[int]]
     """[sent, received] messages, by topic name."""
+    hops: Values = []
+    """Mean number of hops in each of 40 parts of the run, by the time of sending; null: nothing
+    came. Only where robots relay."""
 
 
 class RobotResult(Struct, frozen=True, kw_only=True):
@@ -71,30 +75,44 @@ class LabReport(Struct, frozen=True, kw_only=True):
     out_of_reach: list[tuple[int, int]]
     """(sender, receiver) pairs that never hear each other in the scenario; not in any PDR."""
     damage: str
+    classes: list[ClassOverTime] = []
+    """Delivery and delay of each class, in 40 parts of the run."""
 
 
 def pair_result(
-    sender: int, receiver: int, trace: Trace, began_at: float, duration_s: float
-) -> PairResult:
-    """The figures of one direction between two robots."""
-    pairs, foreign = trace.matches()
-    flat = [pair for found in pairs.values() for pair in found]
-    received, sent = len(flat), trace.n_sent
+    sender: int, receiver: int, trace: Trace, clock: Clock, hop_limit: int | None,
+    counts: Callable[[Sample], bool],
+) -> tuple[PairResult, list[Passage]]:  # fmt: skip
+    """The figures of one direction between two robots, and its messages by topic.
+
+    `counts` says of each sent message whether it could come. `hop_limit` None: nobody relays.
+    """
+    found, foreign = trace.matches()
+    n_matched = sum(map(len, found.values()))
+    passages = [
+        Passage(
+            topic=name,
+            sent=[each for each in samples if counts(each)],
+            pairs=[each for each in found.get(name, []) if counts(each[0])],
+        )
+        for name, samples in sorted(trace.sent.items())
+    ]
+    flat = [pair for passage in passages for pair in passage.pairs]
+    received, sent = len(flat), sum(len(passage.sent) for passage in passages)
     told = [pair for pair in flat if math.isfinite(pair[1].at)]
-    return PairResult(
+    result = PairResult(
         sender=sender,
         receiver=receiver,
         sent=sent,
         received=received,
         pdr=received / sent if sent else 1.0,
-        pdr_tenths=_tenths(trace.sent, flat, began_at, duration_s),
+        pdr_tenths=_tenths(passages, clock),
         latency_ms={name: round(value, 4) for name, value in latency_ms(told).items()},
-        bytes_identical=foreign == 0 and received == trace.n_received,
-        topics={
-            name: [len(samples), len(pairs.get(name, []))]
-            for name, samples in sorted(trace.sent.items())
-        },
+        bytes_identical=foreign == 0 and n_matched == trace.n_received,
+        topics={each.topic: [len(each.sent), len(each.pairs)] for each in passages},
+        hops=[] if hop_limit is None else hops_over_time(flat, clock, hop_limit),
     )
+    return result, passages
 
 
 def robot_result(snapshot: Snapshot, problems: Sequence[str], until_s: float) -> RobotResult:
@@ -127,20 +145,11 @@ def robot_result(snapshot: Snapshot, problems: Sequence[str], until_s: float) ->
     )
 
 
-def _tenths(
-    sent: Mapping[str, Sequence[Sample]],
-    pairs: Sequence[Pair],
-    began_at: float,
-    duration_s: float,
-) -> list[float | None]:
+def _tenths(passages: Sequence[Passage], clock: Clock) -> list[float | None]:
     n_sent, n_received = [0] * TENTHS, [0] * TENTHS
-
-    def tenth(sample: Sample) -> int:
-        return min(max(int((sample.at - began_at) / duration_s * TENTHS), 0), TENTHS - 1)
-
-    for samples in sent.values():
-        for sample in samples:
-            n_sent[tenth(sample)] += 1
-    for was, _ in pairs:
-        n_received[tenth(was)] += 1
+    for passage in passages:
+        for sample in passage.sent:
+            n_sent[clock.part(sample, TENTHS)] += 1
+        for was, _ in passage.pairs:
+            n_received[clock.part(was, TENTHS)] += 1
     return [round(got / of, 4) if of else None for got, of in zip(n_received, n_sent, strict=True)]

@@ -4,6 +4,7 @@ import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import permutations
 from pathlib import Path
 
 from backends import Answer, BackendError, HubWatch
@@ -17,6 +18,7 @@ from sdrlinkd.demo import (
     wait_until_up,
 )
 from sdrlinkd.errors import UserError
+from sdrlinkd.lab.over_time import Clock, Passage, classes_over_time
 from sdrlinkd.lab.report import LabReport, pair_result, robot_result
 from sdrlinkd.lab.robots import open_sources, write_daemon_config
 from sdrlinkd.lab.scenario import Scenario, outages_of
@@ -227,18 +229,22 @@ def _report(
 ) -> LabReport:
     scenario = options.scenario
     sent = _sent(robots, scenario)
-    pairs = [
-        pair_result(
-            sender.id,
-            receiver.id,
-            trace_of(sender.source, sent[sender.id], receiver.listener.received[sender.id]),
-            began_at,
-            scenario.duration_s,
-        )
-        for sender in robots
-        for receiver in robots
-        if sender is not receiver and sent[sender.id] and scenario.in_reach(sender.id, receiver.id)
-    ]
+    clock = Clock(began_at=began_at, duration_s=scenario.duration_s)
+    hop_limit = scenario.hop_limit if scenario.relays else None
+    classes = {at.node: _classes(at) for at in snapshots}
+    pairs, passages = [], list[tuple[str, Passage]]()
+    for sender, receiver in permutations(robots, 2):
+        if not sent[sender.id] or not scenario.in_reach(sender.id, receiver.id):
+            continue
+        trace = trace_of(sender.source, sent[sender.id], receiver.listener.received[sender.id])
+
+        def counts(sample: Sample, ids: tuple[int, int] = (sender.id, receiver.id)) -> bool:
+            """Nobody can expect what was sent while one of the two was off."""
+            return all(scenario.is_on(robot, clock.since_begin(sample)) for robot in ids)
+
+        pair, found = pair_result(sender.id, receiver.id, trace, clock, hop_limit, counts)
+        pairs.append(pair)
+        passages += [(classes[sender.id][each.topic], each) for each in found]
     out_of_reach = [
         (sender.id, receiver.id)
         for sender in robots
@@ -262,7 +268,17 @@ def _report(
         pairs=pairs,
         out_of_reach=out_of_reach,
         damage=robots[0].source.recording.damage,
+        classes=classes_over_time(passages, clock),
     )
+
+
+def _classes(snapshot: Snapshot) -> dict[str, str]:
+    """The class of each topic, by its name in the registry."""
+    prefix = f"/robot_{snapshot.node}/"
+    return {
+        topic.name.removeprefix(prefix).removeprefix("/"): topic.qos
+        for topic in snapshot.link.topics
+    }
 
 
 def _sent(robots: list[_Robot], scenario: Scenario) -> dict[int, dict[str, list[Sample]]]:

@@ -12,6 +12,7 @@ from backends import AirParams, LinkOverride, Outage, RadioParams, Track, World
 from sdrlinkd.config import parse_toml
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.lab.traces import read_outages
+from sdrlinkd.link import LinkParams
 
 MAX_ROBOTS = 64
 # Highest plausible speed.
@@ -21,6 +22,7 @@ LEAST_SNR_DB = -6.0
 REACH_STEPS = 200
 
 Waypoint = Annotated[list[float], Meta(min_length=3, max_length=3)]
+Period = Annotated[list[float], Meta(min_length=2, max_length=2)]
 
 
 class RobotParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -32,6 +34,9 @@ class RobotParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     topics: list[str] = []
     """Topics of the recording, or of the built-in robot, that it sends; []: all."""
     sends: bool = True
+    off: list[Period] = []
+    """Times at which its radio is off, as [begin, end] in s: before it joins, or once it has
+    failed."""
     radio: RadioParams = RadioParams()
 
 
@@ -45,7 +50,7 @@ class OutageParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Time between two messages of the log, in s."""
     from_s: Annotated[float, Meta(ge=0)] = 0.0
     """Time in the log at which the run starts, in s."""
-    times: list[Annotated[list[float], Meta(min_length=2, max_length=2)]] = []
+    times: list[Period] = []
     """Further outages, as [begin, end] in s."""
 
 
@@ -80,8 +85,36 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """End of the experiment, in s of its time."""
         return self.duration_s + self.settle_s
 
+    @property
+    def relays(self) -> bool:
+        """Whether robots forward what others send."""
+        return bool(self.daemon.get("relay", {}).get("policy", "none") != "none")
+
+    def is_on(self, robot_id: int, at: float) -> bool:
+        """Whether the radio of a robot is on at `at`, in s."""
+        (robot,) = (each for each in self.robot if each.id == robot_id)
+        return not any(begin <= at < end for begin, end in robot.off)
+
+    @property
+    def hop_limit(self) -> int:
+        """The longest path in hops, as the daemons have it."""
+        return int(self.daemon.get("link", {}).get("hop_limit", LinkParams().hop_limit))
+
     def in_reach(self, sender: int, receiver: int) -> bool:
-        """Whether `receiver` can ever hear `sender`."""
+        """Whether `receiver` can ever hear `sender`, possibly through others."""
+        if not self.relays:
+            return self._hears(receiver, sender)
+        known, new = set[int](), {sender}
+        while new:
+            known |= new
+            new = {
+                robot.id
+                for robot in self.robot
+                if robot.id not in known and any(self._hears(robot.id, each) for each in new)
+            }
+        return receiver in known
+
+    def _hears(self, receiver: int, sender: int) -> bool:
         world = self.world([])
         times = [self.duration_s * i / REACH_STEPS for i in range(REACH_STEPS + 1)]
         hops = [world.hop(sender, receiver, t) for t in times]
@@ -89,7 +122,8 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def world(self, outages: list[Outage]) -> World:
         """The world that says where everything is."""
-        return World(self.air, self.tracks, self.link, outages)
+        off = {robot.id: [Outage(*each) for each in robot.off] for robot in self.robot if robot.off}
+        return World(self.air, self.tracks, self.link, outages, off)
 
     @property
     def tracks(self) -> dict[int, Track]:
@@ -149,16 +183,20 @@ def _check(scenario: Scenario, source: str) -> None:
             raise ConfigError(
                 f"{source}: link: got robot {link.sender} to itself; allowed: two robots"
             )
-    for begin, end in scenario.outages.times:
+    periods = [("outages.times", each) for each in scenario.outages.times]
+    periods += [
+        (f"robot.off of robot {robot.id}", each) for robot in scenario.robot for each in robot.off
+    ]
+    for key, (begin, end) in periods:
         if end <= begin:
             raise ConfigError(
-                f"{source}: outages.times: got [{begin:g}, {end:g}]; allowed: an end after its "
-                "start"
+                f"{source}: {key}: got [{begin:g}, {end:g}]; allowed: an end after its start"
             )
 
 
 def _check_numbers(scenario: Scenario, source: str) -> None:
     lists = [("outages.times", times) for times in scenario.outages.times]
+    lists += [("robot.off", times) for robot in scenario.robot for times in robot.off]
     lists += [("robot.path", place) for robot in scenario.robot for place in robot.path]
     for key, numbers in lists:
         if not all(map(math.isfinite, numbers)):

@@ -82,7 +82,9 @@ class Listener(Hearing):
             at = FOREVER
             age_s = FOREVER if message.age_us is None else message.age_us * 1e-6
         name = message.topic.removeprefix(f"/rx_robot_{message.source}/")
-        self.received[message.source][name].append(Sample(at, message.payload, age_s))
+        self.received[message.source][name].append(
+            Sample(at, message.payload, age_s, message.hops_left)
+        )
 
 
 def trace_of(source: Source, sent: dict[str, list[Sample]], got: dict[str, list[Sample]]) -> Trace:

@@ -14,9 +14,15 @@ from sdrlinkd.lab import (
     pair_table,
     pictures,
 )
+from sdrlinkd.lab.over_time import BINS, ClassOverTime
 from tests.lab.reports import lost, pair, report, robot
 
 NOBODY_MOVES = Scenario(robot=[])
+HOPS = [1.0, 1.5, 2.0, 7.0, *[None] * (BINS - 4)]
+CLASS = ClassOverTime(
+    qos="urgent", pdr=[1.0, *[None] * (BINS - 1)], p50_ms=[5.0, *[None] * (BINS - 1)],
+    p99_ms=[9.0, *[None] * (BINS - 1)],
+)  # fmt: skip
 STRANGE = "50 $_$ of [/b] robots [bold"
 """Characters that Matplotlib and Rich would interpret."""
 
@@ -30,6 +36,13 @@ STRANGE = "50 $_$ of [/b] robots [bold"
         {"pairs": [pair(1, 2), lost(2, 1)], "out_of_reach": [(1, 3)]},
         {"robots": [robot(1, mcs_changes=[(0.5, 2, 4), (1.5, 2, 3), (1.0, 3, 0)]), robot(2)]},
         {"pairs": [pair(i, j) for i in range(9) for j in range(9) if i != j]},
+        {"pairs": [pair(1, 2, hops=HOPS), pair(2, 1)], "classes": [CLASS]},
+        {"pairs": [pair(1, 2, hops=[None] * BINS)], "classes": []},
+        {
+            "pairs": [pair(1, 2, hops=HOPS)],
+            "classes": [CLASS],
+            "robots": [robot(1, mcs_changes=[(0.5, 2, 4)]), robot(2)],
+        },
     ],
 )
 def test_any_run_can_be_drawn_and_shown(tmp_path, given):

@@ -7,6 +7,7 @@ import pytest
 
 from sdrlinkd.demo import Sample, Trace
 from sdrlinkd.lab import LabReport
+from sdrlinkd.lab.over_time import BINS, Clock, classes_over_time
 from sdrlinkd.lab.report import pair_result, robot_result
 from sdrlinkd.reports import (
     BusReport,
@@ -34,8 +35,9 @@ def numbered(times):
     return [(at, str(i).encode()) for i, at in enumerate(times)]
 
 
-def result(trace, began_at=0.0, duration_s=10.0):
-    return pair_result(1, 2, trace, began_at, duration_s)
+def result(trace, began_at=0.0, duration_s=10.0, hop_limit=None, counts=lambda _: True):
+    clock = Clock(began_at=began_at, duration_s=duration_s)
+    return pair_result(1, 2, trace, clock, hop_limit, counts)[0]
 
 
 def test_all_that_was_sent_arrived():
@@ -198,3 +200,39 @@ def test_a_report_is_json_and_back():
         pairs=[result(trace_of(sent, [(0.02, b"1")]))], out_of_reach=[(1, 3)], damage="",
     )  # fmt: skip
     assert msgspec.json.decode(msgspec.json.encode(report), type=LabReport) == report
+
+
+def test_what_could_not_come_does_not_count():
+    """The receiver was off from 3 s to 6 s; two messages came late all the same."""
+    sent = numbered(range(10))
+    trace = trace_of(sent, [(0.02, payload) for at, payload in sent if at not in (4, 8)])
+    pair = result(trace, counts=lambda sample: not 3 <= sample.at < 6)
+    assert (pair.sent, pair.received) == (7, 6)
+    assert pair.bytes_identical, "what came late was sent, too"
+    assert pair.pdr_tenths == [1.0, 1.0, 1.0, None, None, None, 1.0, 1.0, 0.0, 1.0]
+
+
+def test_hops_are_told_where_robots_relay():
+    trace = trace_of(numbered([0.0, 0.1, 5.0]), [])
+    trace.received["cmd_vel"] = [
+        Sample(INFINITE, b"0", 0.01, hops_left=8),
+        Sample(INFINITE, b"1", 0.01, hops_left=7),
+        Sample(INFINITE, b"2", 0.01, hops_left=6),
+    ]
+    assert result(trace).hops == []
+    hops = result(trace, hop_limit=8).hops
+    assert len(hops) == BINS
+    assert (hops[0], hops[20]) == (1.5, 3.0)
+    assert set(hops[1:20] + hops[21:]) == {None}
+
+
+def test_each_class_is_told_over_time():
+    clock = Clock(began_at=100.0, duration_s=40.0)
+    sent = numbered([100.5, 101.5, 101.6])
+    trace = trace_of(sent, [(0.01, b"0"), (0.03, b"2")])
+    _, passages = pair_result(1, 2, trace, clock, None, lambda _: True)
+    found = classes_over_time([("bulk", passages[0]), ("urgent", passages[0])], clock)
+    assert [each.qos for each in found] == ["urgent", "bulk"]
+    assert found[0].pdr[:3] == [1.0, 0.5, None]
+    assert found[0].p50_ms[:3] == pytest.approx([10.0, 30.0, None])
+    assert len(found[0].p99_ms) == BINS

@@ -222,3 +222,30 @@ def test_shipped_scenarios_need_no_recording_but_one_that_says_so():
             continue
         for source in open_sources(scenario, None).values():
             assert source.topics, name
+
+
+def test_a_robot_whose_radio_is_off_neither_hears_nor_is_heard(load):
+    text = ONE + "off = [[2, 3], [2.5, 4], [9, 100]]\n" + TWO
+    scenario = load(text)
+    world = scenario.world([])
+    for t, is_on in ((0.0, True), (2.0, False), (3.5, False), (4.0, True), (50.0, False)):
+        assert scenario.is_on(1, t) == is_on
+        assert (world.hop(1, 2, t) is not None) == is_on
+        assert (world.hop(2, 1, t) is not None) == is_on
+    with pytest.raises(ConfigError, match=r"robot.off of robot 1: got \[4, 3\]"):
+        load(ONE + "off = [[4, 3]]\n" + TWO)
+
+
+def test_where_robots_relay_those_beyond_are_in_reach(load):
+    links = "[[link]]\nsender = 1\nreceiver = 3\nsnr_db = -300\n"
+    text = ONE + TWO + "[[robot]]\nid = 3\n" + links
+    assert not load(text).in_reach(1, 3)
+    assert load(text + '[daemon.relay]\npolicy = "auto"\n').in_reach(1, 3)
+    alone = text + "[[link]]\nsender = 2\nreceiver = 3\nsnr_db = -300\n"
+    assert not load(alone + '[daemon.relay]\npolicy = "auto"\n').in_reach(1, 3)
+
+
+def test_the_mine_is_whole():
+    mine = load_scenario(shipped_scenarios()["mine"])
+    assert all(mine.in_reach(one.id, other.id) for one in mine.robot for other in mine.robot)
+    assert mine.hop_limit == 8
