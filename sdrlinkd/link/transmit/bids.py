@@ -67,6 +67,8 @@ class Bids:
         if not n_left:
             return None
         first = min(n_left)
-        priority = max(-level.key[1] for level in self._outbox.levels if level.qos is first)
+        priorities = [-level.key[1] for level in self._outbox.levels if level.qos is first]
         lower_s = each_s * sum(n for qos, n in n_left.items() if qos > first)
-        return Waiting(first, priority, 0.0, max(one_s, each_s * n_left[first]), lower_s)
+        return Waiting(
+            first, max(priorities, default=0), 0.0, max(one_s, each_s * n_left[first]), lower_s
+        )
