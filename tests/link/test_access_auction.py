@@ -238,12 +238,14 @@ def test_what_was_told_and_is_gone_is_not_sent_for_later():
 
 
 def test_something_urgent_of_a_robot_with_bulk_waits_for_nobodys_default():
-    n = 8
+    """Its bulk was told, and nobody was silent for longer, so it is next; but others challenge."""
+    n, until_s = 8, SETTLED_S + 10
     air = make_air(n, 6)
     air.saturate(300, qos=Qos.BULK)
-    air.offer_randomly(SETTLED_S + 3, per_s=10, classes=(Qos.DEFAULT,), begin_s=SETTLED_S)
-    send_at_random(air, 0, Qos.URGENT, SETTLED_S + 3)
-    air.run(SETTLED_S + 3.2)
+    for node in range(1, n):
+        send_at_random(air, node, Qos.DEFAULT, until_s, per_s=10.0)
+    send_at_random(air, 0, Qos.URGENT, until_s, per_s=4.0)
+    air.run(until_s + 0.2)
     waits = waits_of(air, Qos.URGENT)
     assert len(waits) > 30
     # A contest for something of class default may just have begun.
