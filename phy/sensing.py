@@ -59,17 +59,23 @@ class EnergyDetector:
         """Absolute index after the last busy window of a carrier; `start` if there was none."""
         return int(self._state[CARRIER_UNTIL])
 
-    @property
-    def pulses(self) -> list[int]:
-        """Absolute indices at which the last runs began that may be pulses, ascending.
+    def pulses(self, since: float = -math.inf) -> list[int]:
+        """Absolute indices after `since` at which runs began that may be pulses, ascending.
 
-        They are exact to a window. The last one may still turn out to be the begin of a carrier.
+        They are exact to a window. The last 16 are known, and the present one, which may still turn
+        out to be the begin of a carrier.
         """
         state, n = self._state, int(self._state[N_SHORT])
-        found = [int(state[SHORT + i % MOST_SHORT]) for i in range(max(0, n - MOST_SHORT), n)]
+        found: list[int] = []
+        # Most blocks have none, so the newest come first.
+        for i in range(n - 1, max(0, n - MOST_SHORT) - 1, -1):
+            begin = int(state[SHORT + i % MOST_SHORT])
+            if begin <= since:
+                break
+            found.insert(0, begin)
         length = state[BUSY_UNTIL] - state[RUN_FROM]
         is_over = state[NEXT] >= state[BUSY_UNTIL] + SENSE_WINDOW
-        if LEAST_PULSE <= length <= MOST_PULSE and is_over:
+        if LEAST_PULSE <= length <= MOST_PULSE and is_over and state[RUN_FROM] > since:
             found.append(int(state[RUN_FROM]))
         return found
 

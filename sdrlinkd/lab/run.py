@@ -150,7 +150,7 @@ def _acquainted(robots: list[_Robot], scenario: Scenario) -> None:
     """
     deadline = time.monotonic() + ACQUAINTED_S
     wanted = {
-        robot.id: {each.id for each in robots if scenario.in_reach(each.id, robot.id)} - {robot.id}
+        robot.id: {each.id for each in robots if scenario.hears(robot.id, each.id)} - {robot.id}
         for robot in robots
     }
     while time.monotonic() < deadline:
@@ -230,7 +230,7 @@ def _report(
     scenario = options.scenario
     sent = _sent(robots, scenario)
     clock = Clock(began_at=began_at, duration_s=scenario.duration_s)
-    hop_limit = scenario.hop_limit if scenario.relays else None
+    hop_limit, world = scenario.hop_limit if scenario.relays else None, scenario.world([])
     classes = {at.node: _classes(at) for at in snapshots}
     pairs, passages = [], list[tuple[str, Passage]]()
     for sender, receiver in permutations(robots, 2):
@@ -240,7 +240,8 @@ def _report(
 
         def counts(sample: Sample, ids: tuple[int, int] = (sender.id, receiver.id)) -> bool:
             """Nobody can expect what was sent while one of the two was off."""
-            return all(scenario.is_on(robot, clock.since_begin(sample)) for robot in ids)
+            at = clock.since_begin(sample)
+            return not any(world.is_off(robot, at) for robot in ids)
 
         pair, found = pair_result(sender.id, receiver.id, trace, clock, hop_limit, counts)
         pairs.append(pair)

@@ -90,11 +90,6 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """Whether robots forward what others send."""
         return bool(self.daemon.get("relay", {}).get("policy", "none") != "none")
 
-    def is_on(self, robot_id: int, at: float) -> bool:
-        """Whether the radio of a robot is on at `at`, in s."""
-        (robot,) = (each for each in self.robot if each.id == robot_id)
-        return not any(begin <= at < end for begin, end in robot.off)
-
     @property
     def hop_limit(self) -> int:
         """The longest path in hops, as the daemons have it."""
@@ -103,18 +98,19 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def in_reach(self, sender: int, receiver: int) -> bool:
         """Whether `receiver` can ever hear `sender`, possibly through others."""
         if not self.relays:
-            return self._hears(receiver, sender)
+            return self.hears(receiver, sender)
         known, new = set[int](), {sender}
         while new:
             known |= new
             new = {
                 robot.id
                 for robot in self.robot
-                if robot.id not in known and any(self._hears(robot.id, each) for each in new)
+                if robot.id not in known and any(self.hears(robot.id, each) for each in new)
             }
         return receiver in known
 
-    def _hears(self, receiver: int, sender: int) -> bool:
+    def hears(self, receiver: int, sender: int) -> bool:
+        """Whether `receiver` can ever hear `sender` itself."""
         world = self.world([])
         times = [self.duration_s * i / REACH_STEPS for i in range(REACH_STEPS + 1)]
         hops = [world.hop(sender, receiver, t) for t in times]

@@ -17,7 +17,9 @@ class Airtimes:
         self._pdu_size = pdu_size
 
     def samples(self, mcs: int, n_pdus: int) -> int:
-        """Length of a burst of `n_pdus` PDUs in samples."""
+        """Length of a burst of `n_pdus` PDUs in samples; without any, it is a pulse."""
+        if not n_pdus:
+            return phy.N_PULSE
         return phy.layout(self._grid, mcs, n_pdus, self._pdu_size).n_samples
 
     def airtime_s(self, mcs: int, n_pdus: int) -> float:

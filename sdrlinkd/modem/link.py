@@ -6,7 +6,6 @@ import time
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 
-import phy
 from backends import AbsentError, BackendError, Capabilities, RefusalError
 from sdrlinkd.config import ModemParams
 from sdrlinkd.errors import ConfigError, LinkAbsentError, LinkRefusedError, UserError
@@ -241,9 +240,6 @@ class ModemLink:
             wait_s = listener.next_wakeup(now) - now
             return wait_s if wait_s > 0 else INFINITE
         start = round(burst.start * rate)
-        n_samples = phy.N_PULSE
-        if not burst.is_pulse:
-            n_samples = self._airtimes.samples(burst.mcs, len(burst.pdus))
-        self._plan.commit(start, n_samples)
+        self._plan.commit(start, self._airtimes.samples(burst.mcs, len(burst.pdus)))
         modem.send(self._on_air.add(burst, start, rate))
         return 0.0

@@ -229,7 +229,7 @@ def test_a_robot_whose_radio_is_off_neither_hears_nor_is_heard(load):
     scenario = load(text)
     world = scenario.world([])
     for t, is_on in ((0.0, True), (2.0, False), (3.5, False), (4.0, True), (50.0, False)):
-        assert scenario.is_on(1, t) == is_on
+        assert world.is_off(1, t) != is_on
         assert (world.hop(1, 2, t) is not None) == is_on
         assert (world.hop(2, 1, t) is not None) == is_on
     with pytest.raises(ConfigError, match=r"robot.off of robot 1: got \[4, 3\]"):

@@ -282,16 +282,30 @@ def test_priority_counts_in_a_class(priority, challenges):
 
 
 def test_a_burst_that_does_not_leave_was_none():
-    """As if it had never been: the others have heard nothing."""
-    access = make_access(params("auction", [1, 2]), 1, FAST, LONGEST_S, Random(1))
-    access.heard(2, 0.9, False)
-    before = access._wants.in_order(), access._wants.n_bursts
-    access.told(Waiting(Qos.BULK, 0, 0.0, 1.0), 1.0)
-    access.sent(1.1, None)
-    access.not_sent(1.0)
-    assert (access._wants.in_order(), access._wants.n_bursts) == before
-    assert access._wants.first(1.0) is None
-    assert access.own_end < 1.0
+    """The others have not heard what it told, so its robot is not next by that."""
+    for has_left in (True, False):
+        access = make_access(params("auction", [1, 2]), 1, FAST, LONGEST_S, Random(1))
+        access.heard(2, 0.9, False)
+        access.take_want(Want(2, Qos.BULK, 0, 0, 0, 0), 0.9)
+
+        def look(now, end, at, access=access):
+            sensed = Sensed(now, end, at, end, at)
+            return access.slot(Wish(now + FAST.lead_s, Qos.BULK, SHORT_S, sensed))
+
+        look(0.9505, 0.95, 0.9)
+        access.told(Waiting(Qos.BULK, 0, 0.0, 1.0), 1.0)
+        access.sent(1.01, None)
+        if not has_left:
+            access.not_sent(1.0)
+            assert access.own_end < 1.0
+        look(1.0105, 0.95, 0.9)
+        access.heard(2, 1.02, False)
+        access.take_want(Want(2, Qos.BULK, 0, 0, 0, 0), 1.02)
+        now, slot = 1.03, None
+        while slot is None:
+            slot = look(now, 1.03, 1.02)
+            now += 1e-4
+        assert slot.is_pulse != has_left
 
 
 times = st.floats(0, 3)

@@ -8,7 +8,7 @@ import pytest
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import ClassesParams, Opportunity, Outcome, Overrides, Qos, RateParams, Sensed
 from sdrlinkd.link.access import waiting_of
-from sdrlinkd.wire import Want, parse
+from sdrlinkd.wire import Want, equal_payload, parse
 from tests.link.pulsing import FAST
 from tests.link.radios import params
 from tests.link.world import make_link, records_in, tell
@@ -180,3 +180,12 @@ def test_small_pdus_with_parity_carry_all():
         for pdu in burst.pdus:
             got += other.hear(pdu, burst.start, 20.0, burst.start + burst.airtime_s)
     assert [len(each.payload) for each in got] == [900]
+
+
+def test_each_pdu_keeps_12_octets_free():
+    """As the documents say, also those that have no WANT."""
+    link = make()
+    link.submit(0, bytes(4000), 1.0)
+    first = next(each for each in bursts_of(link) if not each.is_pulse)
+    free = {equal_payload(SIZE, 1) - len(parse(pdu, SIZE).entries[0].payload) for pdu in first.pdus}
+    assert free == {12}

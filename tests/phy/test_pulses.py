@@ -36,9 +36,9 @@ def test_it_is_found_once_wherever_it_begins_and_however_it_comes(offset, chunk,
     for at in range(0, len(x), chunk):
         sense.push(x[at : at + chunk])
     begins = [REST + offset, 2 * REST + offset + N_PULSE]
-    assert len(sense.pulses) == 2
+    assert len(sense.pulses()) == 2
     assert all(
-        abs(found - begin) < WINDOW for found, begin in zip(sense.pulses, begins, strict=True)
+        abs(found - begin) < WINDOW for found, begin in zip(sense.pulses(), begins, strict=True)
     )
     assert sense.carrier_until == 0
 
@@ -49,7 +49,7 @@ def test_a_burst_is_a_carrier_and_no_pulse():
     x = noisy(draws, np.concatenate((silence(REST), burst, silence(REST))), 15)
     sense = EnergyDetector()
     sense.push(x)
-    assert sense.pulses == []
+    assert sense.pulses() == []
     assert sense.carrier_until == sense.busy_until
     assert abs(sense.carrier_until - REST - len(burst)) < 2 * WINDOW
 
@@ -62,7 +62,7 @@ def test_a_burst_that_begins_is_never_taken_for_a_pulse(chunk):
     sense = EnergyDetector()
     for at in range(0, len(x), chunk):
         sense.push(x[at : at + chunk])
-        assert sense.pulses == []
+        assert sense.pulses() == []
     assert sense.carrier_until > REST
 
 
@@ -75,15 +75,28 @@ def test_pulses_of_two_robots_in_one_mini_slot_are_one(apart):
     x[REST + apart : REST + apart + N_PULSE] += pulse() * np.exp(1j)
     sense = EnergyDetector()
     sense.push(noisy(draws, x, 15))
-    (found,) = sense.pulses
+    (found,) = sense.pulses()
     assert abs(found - REST) < WINDOW
     assert sense.carrier_until == 0
+
+
+def test_they_are_heard_from_7_db_on():
+    """As the documents say; a burst of MCS 0 is read below that."""
+    draws, sense, n = rng(), EnergyDetector(), 1000
+    sense.push(noise(draws, 100 * WINDOW))
+    n_heard = 0
+    for _ in range(n):
+        begin = sense.next_index
+        x = np.concatenate((silence(int(draws.integers(0, WINDOW))), pulse(), silence(REST)))
+        sense.push(noisy(draws, x, 7))
+        n_heard += len(sense.pulses(begin - WINDOW)) == 1
+    assert n_heard >= 0.999 * n
 
 
 def test_noise_alone_has_none():
     sense = EnergyDetector()
     sense.push(noise(rng(), 2_000_000))
-    assert sense.pulses == []
+    assert sense.pulses() == []
 
 
 def test_only_the_last_ones_are_kept():
@@ -91,7 +104,7 @@ def test_only_the_last_ones_are_kept():
     for _ in range(40):
         sense.push(noisy(draws, np.concatenate((silence(REST), pulse(), silence(REST))), 15))
     step = 2 * REST + N_PULSE
-    assert [round(each / step - 0.5) for each in sense.pulses] == list(range(23, 40)), (
+    assert [round(each / step - 0.5) for each in sense.pulses()] == list(range(23, 40)), (
         "16, and the last one"
     )
 

@@ -17,7 +17,8 @@ from sdrlinkd.link.access.base import NEVER, BusyChannel, Slot, Wish
 from sdrlinkd.link.access.by_auction import ByAuction
 from sdrlinkd.link.access.contest import Contest, n_bits
 from sdrlinkd.link.access.known_wants import KnownWants
-from sdrlinkd.link.access.mini_rounds import DRIFT, QUIET, ROUNDING_S, MiniRounds, Place, is_near
+from sdrlinkd.link.access.mini_rounds import QUIET, MiniRounds, Place, is_near
+from sdrlinkd.link.access.own_slots import OwnSlots
 from sdrlinkd.link.access.requests import Waiting, waiting_of
 from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.qos import Qos
@@ -69,6 +70,8 @@ class Auction(BusyChannel):
         self._looked_at = -inf
         """The end of the last burst of others that we have looked at."""
         self._rounds = MiniRounds(minislot_s, self._n_bits)
+        self._slots = OwnSlots(minislot_s, 2 * len(nodes))
+        """Those for robots that are sure of the order, and then those for all others."""
         self._pulses: list[float] = []
         """When our last pulses began."""
         self._contest: tuple[float, Contest] | None = None
@@ -272,19 +275,12 @@ class Auction(BusyChannel):
 
     def _in_turn(self, wish: Wish, idle_since: float) -> Slot | None:
         """Without pulses: a mini-slot for each robot, in the order in which they were silent."""
-        sensed, n = wish.sensed, len(self._nodes)
-        idle_since = max(idle_since, sensed.idle_since)
-        if idle_since > sensed.until:
-            return None
-        begin, number = self._minislot_s, self._wants.in_order().index(self._own_id)
+        number = self._wants.in_order().index(self._own_id)
         if self._wants.is_unsure(self._own_id, wish.earliest):
-            number = n + self._rank
-        while True:
-            width_s = self._minislot_s + 2 * DRIFT * begin
-            start = idle_since + begin + number * width_s
-            if start >= wish.earliest - ROUNDING_S:
-                break
-            begin += 2 * n * width_s
-        if start > sensed.until + width_s - DRIFT * begin - self._detect_s:
+            number = len(self._nodes) + self._rank
+        # Here, a pulse is a carrier like any other.
+        idle_since = max(idle_since, wish.sensed.idle_since)
+        own = self._slots.next(number, idle_since, wish.earliest)
+        if not own.is_known(wish.sensed.until, self._detect_s):
             return None
-        return self._burst(wish, max(start, wish.earliest))
+        return self._burst(wish, max(own.start, wish.earliest))

@@ -5,12 +5,11 @@ from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.link.access.requests import Waiting
+from sdrlinkd.link.access.team import PRESENT_S
 from sdrlinkd.link.qos import Qos
 
 WANTED_S = 1.0
 """Time in s for which what a robot has told counts."""
-HERE_S = 3.5
-"""Time in s after which a robot that was not heard is gone: three periods of its beacon."""
 
 
 class Wanted(NamedTuple):
@@ -83,7 +82,7 @@ class KnownWants:
         # Robots that were never heard may be here all the same, for some time.
         began_at = self._missed_at if self._began_at is None else self._began_at
         return any(
-            now - HERE_S < self._on_air_at.get(node, began_at) <= self._missed_at
+            now - PRESENT_S < self._on_air_at.get(node, began_at) <= self._missed_at
             for node in self._nodes
             if node != own
         )

@@ -9,12 +9,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from sdrlinkd.link.access.base import NEVER
+from sdrlinkd.link.access.own_slots import DRIFT, ROUNDING_S
 
-DRIFT = 4e-5
-"""Drift of two 20 ppm clocks, in s per second since the channel fell idle."""
 QUIET = 2
 """Mini-slots of a round without a challenge."""
-ROUNDING_S = 1e-9
 
 
 class Place(NamedTuple):

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from enum import Enum, auto
 
 from sdrlinkd.link.access.base import NEVER, BusyChannel, Slot, Wish
+from sdrlinkd.link.access.own_slots import OwnSlots
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.traits import Sensed
 
@@ -19,8 +20,6 @@ LEVELS = 2
 """Levels of mini-slots: urgent and latency start before default and bulk."""
 SECTIONS = LEVELS + 1
 """Sections of a round: the levels, then the robots that do not know the last sender."""
-DRIFT = 4e-5
-"""Drift of two 20 ppm clocks, in s per second since the channel fell idle."""
 
 
 class Ended(Enum):
@@ -73,9 +72,7 @@ class MiniSlots(BusyChannel):
         """The last PDU heard, as (source, start of its burst, whether it was relayed)."""
         self._own_src: int | None = None
         """Source of the PDUs that we sent last, if we relayed them."""
-        self._n_slots = SECTIONS * len(nodes)
-        self._round = (NEVER, 0.0)
-        """The current round, as (time since which the channel is idle, start after that in s)."""
+        self._slots = OwnSlots(minislot_s, SECTIONS * len(nodes))
 
     @property
     def state(self) -> str:
@@ -106,20 +103,12 @@ class MiniSlots(BusyChannel):
         if idle_since is None:
             return None
         place = self._place(idle_since, qos, sensed)
-        begin = self._round[1] if self._round[0] == idle_since else self._minislot_s
-        while True:
-            drift_s = DRIFT * begin
-            width_s = self._minislot_s + 2 * drift_s
-            start = idle_since + begin + place * width_s
-            if start >= earliest - 1e-9:
-                break
-            begin += self._n_slots * width_s
-        self._round = (idle_since, begin)
-        if start > sensed.until + width_s - drift_s - self._detect_s:
+        own = self._slots.next(place, idle_since, earliest)
+        if not own.is_known(sensed.until, self._detect_s):
             return None
         # A burst in an urgent mini-slot carries only urgent classes after its first PDU.
         least = Qos.LATENCY if qos <= Qos.LATENCY else Qos.BULK
-        return Slot.exact(max(start, earliest), least=least)
+        return Slot.exact(max(own.start, earliest), least=least)
 
     def sent(self, end: float, src: int | None) -> None:
         """Remember our own burst, which we do not hear."""

@@ -59,7 +59,8 @@ class SensingReceiver:
             end, at = sensed.idle_since, sensed.burst_at
         else:
             _, end, at, *_ = self._sense_energy(sense, sense.carrier_until)
-        pulses = tuple(each / self._rate_hz for each in sense.pulses if each / self._rate_hz > end)
+        rate = self._rate_hz
+        pulses = tuple(each / rate for each in sense.pulses(end * rate))
         return sensed._replace(carrier_end=end, carrier_at=at, pulses=pulses)
 
     def _sense_energy(self, sense: "phy.EnergyDetector", energy_end: int) -> Sensed:
