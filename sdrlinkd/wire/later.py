@@ -84,14 +84,15 @@ def forwarded(pdu: bytes, by_us: int, has_control: bool) -> bytes:
 def lasting_identity(pdu: bytes) -> tuple[int, int, int]:
     """`identity` of a valid PDU with control channel, with the ages in its STAMPs taken as zero.
 
-    A relay adds the time for which it held the PDU to those ages. CRC-16 is linear, so the
-    contribution of four octets is their CRC in a body of zeros.
+    A relay adds the time for which it held the PDU to those ages.
     """
-    src, seq, crc = identity(pdu)
-    end = len(pdu) - CRC_SIZE
-    for at in _times(pdu, _FORWARDED):
-        crc ^= crc16(pdu[at : at + _U32.size] + bytes(end - at - _U32.size))
-    return src, seq, crc
+    ages = [*_times(pdu, _FORWARDED)]
+    if not ages:
+        return identity(pdu)
+    without = bytearray(pdu)
+    for at in ages:
+        _U32.pack_into(without, at, 0)
+    return identity(without)
 
 
 def _times(pdu: bytes | bytearray, kinds: dict[int, int]) -> Iterator[int]:

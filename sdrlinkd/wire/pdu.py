@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
+from zlib import crc32
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire.builder import (
@@ -103,18 +104,20 @@ def parse(data: bytes, pdu_size: int, *, is_intact: bool = False) -> Pdu:
     )
 
 
-def identity(data: bytes) -> tuple[int, int, int]:
-    """(src, seq, CRC with the hop nibble taken as zero), equal for all receptions of one PDU.
+def identity(data: bytes | bytearray) -> tuple[int, int, int]:
+    """(src, seq, CRC-32 with the hop nibble taken as zero), equal for all receptions of one PDU.
 
-    A relay changes the hop nibble and with it the CRC. CRC-16 is linear, so one table look-up
-    removes the nibble's contribution, without a second pass over the PDU.
+    A relay changes the hop nibble and with it the PDU's own CRC. CRC-32 is linear, so one table
+    look-up removes the nibble's contribution. The PDU's own CRC would not do: several PDUs with the
+    same seq come in a second, and each would be taken for another once in 65536 times.
     """
-    crc = data[-2] << 8 | data[-1]
+    crc = crc32(memoryview(data)[:-CRC_SIZE])
     return data[1], data[3], crc ^ _hop_shares(len(data))[data[4] >> 4]
 
 
 @lru_cache(maxsize=8)
 def _hop_shares(pdu_size: int) -> tuple[int, ...]:
-    """CRCs of bodies that are zero except for the hop nibble, for its 16 values."""
+    """What the values of the hop nibble contribute to the CRC-32."""
     rest = bytes(pdu_size - HEADER_SIZE - CRC_SIZE)
-    return tuple(crc16(bytes((0, 0, 0, 0, hop << 4)) + rest) for hop in range(16))
+    crcs = [crc32(bytes((0, 0, 0, 0, hop << 4)) + rest) for hop in range(16)]
+    return tuple(crc ^ crcs[0] for crc in crcs)

@@ -27,6 +27,28 @@ def test_a_number_returns_after_256():
     assert track.lost == 0
 
 
+@pytest.mark.parametrize("behind", [100, 150, 200])
+def test_what_a_relay_sends_may_be_far_behind(behind):
+    """Every third PDU is urgent, and overtakes those that wait at the relay."""
+    order = sorted(range(900), key=lambda number: number + behind * (number % 3 > 0))
+    track = SequenceTrack()
+    for at, number in enumerate(order):
+        assert track.heard(number & 0xFF, number, 1e-3 * at, is_forwarded=True)
+        assert track.number == number
+        # A robot further on forwards what we have sent it.
+        echo = order[max(0, at - 400)]
+        assert not track.heard(echo & 0xFF, echo, 1e-3 * at, is_forwarded=True)
+    assert (track.lost, track.restarts) == (0, 0)
+
+
+def test_what_a_relay_sends_after_a_pause_may_be_far_ahead():
+    track = SequenceTrack()
+    for number in range(50):
+        track.heard(number, number, 1e-3 * number, is_forwarded=True)
+    assert track.heard(120, 120, 2.0, is_forwarded=True)
+    assert (track.newest, track.lost) == (120, 70)
+
+
 def test_late_arrivals_take_the_count_back():
     track = SequenceTrack()
     for seq in (10, 13):

@@ -9,6 +9,8 @@ from sdrlinkd.wire import PDU_NUMBERS, nearest_number
 WINDOW = 128
 KEEP_S = 1.0
 """Time in s for which a PDU is known again; repeated ones come up to this late."""
+FORWARDED_AHEAD, LATELY_S = 32, 0.25
+"""A PDU that a relay sent, `LATELY_S` or less after another one, is less far ahead than this."""
 REORDERED = 64
 """How far behind the newest one a PDU may be that was sent before the first one heard."""
 NOTHING: Sequence[int] = range(0)
@@ -19,11 +21,12 @@ MOST_PER_S = 20_000
 class SequenceTrack:
     """The PDUs of one source: duplicates, and known losses.
 
-    Two PDUs are the same if PDU number and CRC (with the hop nibble taken as zero) are equal. PDUs
-    bring only the lowest octet of their number. A step of n, up to 127 ahead, means that n − 1 PDUs
-    are lost, unless the source tells another number. An older number that was missing is a late
-    arrival. Any other older number means that the sender restarted, or was away for longer than an
-    octet can tell; the next number that it tells decides.
+    Two PDUs are the same if PDU number and CRC-32 (with the hop nibble taken as zero) are equal.
+    PDUs bring only the lowest octet of their number. A step of n, up to 127 ahead, means that n − 1
+    PDUs are lost, unless the source tells another number. An older number that was missing is a
+    late arrival. A relay sends urgent PDUs first, so what it forwards may be up to 224 behind. Any
+    other older number means that the sender restarted, or was away for longer than an octet can
+    tell; the next number that it tells decides.
 
     A restarted sender may also continue with a number that looks like a step ahead. Only its boot
     id tells: `restart` takes back the largest step since `goes_on` last confirmed the old one.
@@ -69,7 +72,7 @@ class SequenceTrack:
 
     def heard(
         self, seq: int, crc: int, at: float = 0.0, told: int | None = None, *,
-        is_sealed: bool = False, first_at: float | None = None,
+        is_sealed: bool = False, is_forwarded: bool = False, first_at: float | None = None,
     ) -> bool:  # fmt: skip
         """Note a PDU that came at `at`; False if it is a duplicate.
 
@@ -80,14 +83,14 @@ class SequenceTrack:
         self.skipped, self.fills = NOTHING, False
         if self._order:
             self._forget(at)
-            reach = inf if is_sealed else WINDOW if told is None else 0
+            reach = inf if is_sealed or is_forwarded else WINDOW
+            reach = reach if told is None or is_sealed else 0
             if self._is_known(seq, crc, reach):
                 return False
         if self.newest < 0:
             self._begin(seq if told is None else told, crc, at, is_told=told is not None)
             return True
-        ahead = (seq - self.newest) & 0xFF
-        number = self.newest + ahead - (0 if 0 < ahead < WINDOW else 256 if ahead else 0)
+        number = self._placed(seq, at, is_forwarded=is_forwarded)
         if told is not None:
             number = self._aligned(number, told, at)
         step = number - self.newest
@@ -104,7 +107,9 @@ class SequenceTrack:
             self._heard += 1
         elif number in self._seen and told is not None and self._seen[number][0] == crc:
             return False
-        elif number in self._seen or (told is None and not self._may_be_late(number)):
+        elif number in self._seen or (
+            told is None and not is_forwarded and not self._may_be_late(number)
+        ):
             self._jump(seq, crc, at)
             return True
         else:
@@ -168,6 +173,12 @@ class SequenceTrack:
         self._heard += 1
         self._note(self.newest, crc, at)
 
+    def _placed(self, seq: int, at: float, *, is_forwarded: bool) -> int:
+        """The number of a PDU by its sequence number."""
+        is_late = is_forwarded and at - self._newest_at < LATELY_S
+        ahead, limit = (seq - self.newest) & 0xFF, FORWARDED_AHEAD if is_late else WINDOW
+        return self.newest + ahead - (0 if ahead < limit else 256)
+
     def _aligned(self, number: int, told: int, at: float) -> int:
         """The number of a PDU, which is `number` by its sequence number and `told` by its source.
 
@@ -203,7 +214,8 @@ class SequenceTrack:
     def _is_known(self, seq: int, crc: int, reach: float) -> bool:
         """Whether the PDU was heard among the last `reach` ones.
 
-        Without T, a PDU with the same content may come every 256 PDUs.
+        Without T, its source may send a PDU with the same content every 256 PDUs. Relays may send
+        one again that is far behind.
         """
         number = self.newest - ((self.newest - seq) & 0xFF)
         # Numbers come nearly in order, so what came first is nearly the lowest.

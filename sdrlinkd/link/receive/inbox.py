@@ -124,7 +124,10 @@ class Inbox:
         if admitted.number is not None:
             told, repeated_at = admitted.number, first_at
         is_known = admitted.ticks is None and self._commands.has_heard(pdu, admitted.raw, at)
-        if is_known or not track.heard(*key[1:], at, told, is_sealed=key[0], first_at=repeated_at):
+        is_new = not is_known and track.heard(
+            *key[1:], at, told, is_sealed=key[0], is_forwarded=is_forwarded, first_at=repeated_at
+        )
+        if not is_new:
             neighbor.count_duplicate()
             return self._drop("rx_dup", events)
         neighbor.count_new(pdu.hop, is_repaired=track.fills and admitted.number is not None)
