@@ -16,6 +16,8 @@ DEVIATIONS = 4
 """The wait is the mean time of an answer and so many mean deviations, as TCP has it."""
 UNANSWERED = 3
 """PDUs without an answer after which the route goes around."""
+MOST_DOUBTS = 6
+"""How often in a row a ROUTE is told again as somebody may not know it."""
 MOST_KEPT = 256
 ACTIVE_S = 2.0
 """Time in s without a PDU after which a flow has ended."""
@@ -46,6 +48,10 @@ class Flow:
         """When ROUTE was made last."""
         self.is_news = False
         """Whether others are named than before."""
+        self.doubts = 0
+        """How often in a row ROUTE was told again as somebody may not know it."""
+        self._unsure: frozenset[int] = frozenset()
+        """The robots of which it is not known whether they know that they are named."""
         self.first = 0
         """The number of the first PDU that those named are to forward."""
         self.hops_left = 0
@@ -79,6 +85,8 @@ class Flow:
             open_ = [self.first_unanswered(hop) for hop in self.hops]
             self.first = min((each for each in open_ if each is not None), default=self._newest)
             self.is_news = True
+            self.doubts = 0
+            self._unsure = (self._unsure | robots - self.robots) & robots
         if hops != self.hops:
             # Those that are new have time from now on.
             self._sent = deque(
@@ -95,12 +103,17 @@ class Flow:
         (hop,) = self.hops
         number = max((each.number for each in self._sent if each.number & 0xFF == seq), default=-1)
         if number >= 0:
-            self.answered(hop, number + 1, at)
+            self.answered(hop, number + 1, at, is_named=True)
 
-    def answered(self, hop: int, up_to: int, at: float) -> bool:
-        """Note that a robot has heard of all PDUs before `up_to`; False if it need not answer."""
+    def answered(self, hop: int, up_to: int, at: float, *, is_named: bool = False) -> bool:
+        """Note that a robot has heard of all PDUs before `up_to`; False if it need not answer.
+
+        `is_named`: it would not have answered without knowing that it is named.
+        """
         if hop not in self.hops:
             return False
+        if is_named:
+            self._unsure -= {hop}
         up_to = heard_number(self._sent[-1].number + 1 if self._sent else up_to, up_to)
         before = self._answered.get(hop, -1)
         if up_to <= before:
@@ -139,6 +152,11 @@ class Flow:
         """How long an answer of a robot is awaited, in s."""
         mean_s, deviation_s = self._wait_s.get(hop, (ANSWER_S, 0.0))
         return min(max(mean_s + DEVIATIONS * deviation_s, LEAST_WAIT_S), MOST_WAIT_S)
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether those that forward next should hear of it again."""
+        return bool(self._unsure) and self.doubts < MOST_DOUBTS
 
     def is_active(self, now: float) -> bool:
         """Whether PDUs were sent lately."""

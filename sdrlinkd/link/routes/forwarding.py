@@ -10,8 +10,8 @@ from sdrlinkd.link.routes.named import Ends
 from sdrlinkd.reports import FlowReport
 from sdrlinkd.wire import BROADCAST, PDU_NUMBERS, Need, Route
 
-RENEWED_S = 1.0
-"""Time in s after which a ROUTE is told again."""
+RENEWED_S, DOUBTED_S = 1.0, 0.15
+"""Times in s after which a ROUTE is told again: usually, and where somebody may not know it."""
 AROUND_S, LEAST_AROUND_S = 5.0, 1.0
 """Time in s for which a robot that did not answer is gone around; the least if it does answer."""
 STAYS = 0.8
@@ -61,7 +61,7 @@ class Forwarding:
         up_to = (max(need.numbers(), default=need.number - 1) + 1) % PDU_NUMBERS
         for flow in self._flows.values():
             if flow.src == need.node:
-                flow.answered(hop, up_to, at)
+                flow.answered(hop, up_to, at, is_named=not any(need.bitmap))
         if at - self.around.get(hop, at) > LEAST_AROUND_S:
             del self.around[hop]
             self._version = -1
@@ -81,6 +81,9 @@ class Forwarding:
                 del self._flows[ends]
             elif flow.robots and now - flow.told_at > RENEWED_S:
                 self.has_news = True
+            elif flow.is_doubtful and now - flow.told_at > DOUBTED_S:
+                flow.doubts += 1
+                flow.is_news = self.has_news = True
         return again
 
     def take_news(self, now: float) -> Iterator[tuple[Route, float]]:
