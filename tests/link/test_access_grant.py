@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from functools import cache
-from itertools import pairwise
+from itertools import combinations, pairwise
 from random import Random
 
 import pytest
@@ -13,6 +13,7 @@ from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import Qos, Sensed
 from sdrlinkd.link.access import (
     LEAST_ROOM,
+    Apart,
     Due,
     Ticks,
     Times,
@@ -22,7 +23,9 @@ from sdrlinkd.link.access import (
     places_of,
     plan,
     shares,
+    stages,
     together,
+    told,
     waiting_of,
     want_of,
 )
@@ -34,6 +37,7 @@ from tests.link.turns import LONGEST_S, PDU_S, ROOM, STEP_S, TRAITS, Team
 FORMED_S = 3.0
 TIMES = Times(Ticks(1e-4, 2e-4), PDU_S, 0.02, LONGEST_S, 3e-4, 5e-4)
 CHAIN = {(1, 2), (2, 3)}
+TUNNEL = {(1, 2), (2, 3), (3, 4), (4, 5)}
 BRIDGE = {(1, 2), (2, 3), (3, 4), (4, 5), (2, 5)}
 
 
@@ -84,7 +88,7 @@ def test_whoever_has_something_urgent_waits_for_a_round_at_most(n):
 
 
 @pytest.mark.parametrize("links", [CHAIN, BRIDGE], ids=["chain", "bridge"])
-def test_robots_that_do_not_hear_each_other_never_send_at_once(links):
+def test_robots_of_which_somebody_hears_both_never_send_at_once(links):
     nodes = {node for link in links for node in link}
     for seed in range(3):
         team = saturated(len(nodes), seed, links=links, loss=0.02)
@@ -95,6 +99,64 @@ def test_robots_that_do_not_hear_each_other_never_send_at_once(links):
         assert team.clashes(2 * FORMED_S) == []
         late = {each.src for each in team.bursts if each.begin > 2 * FORMED_S}
         assert late == nodes
+
+
+def test_robots_that_are_three_hops_apart_send_at_once():
+    far = {frozenset(pair) for pair in ((1, 4), (1, 5), (2, 5))}
+    for seed in range(2):
+        team = saturated(5, seed, links=TUNNEL, loss=0.02)
+        team.run(FORMED_S / 2)
+        team.tell_links()
+        team.run(2 * FORMED_S + 4)
+        since_s = 2 * FORMED_S + 2
+        beside = list(team.beside(since_s))
+        assert {frozenset((one.src, other.src)) for one, other in beside} <= far
+        both_s = sum(min(one.end, other.end) - other.begin for one, other in beside)
+        assert both_s > 0.2 * 2
+
+
+nodes_of = st.integers(1, 9)
+
+
+@law()
+@given(
+    st.lists(st.tuples(nodes_of, st.integers(1, 200)), max_size=10),
+    st.lists(st.tuples(nodes_of, nodes_of), max_size=14),
+    st.integers(0, 14),
+    st.dictionaries(nodes_of, st.integers(1, 400)),
+)
+def test_turns_at_once_are_of_robots_of_which_nobody_hears_both(turns, links, most, uses):
+    edges = {}
+    for one, other in links:
+        edges.setdefault(one, {})[other] = edges.setdefault(other, {})[one] = 1.0
+    parents = places_of(1, edges).parents
+    found = stages(turns, uses, Apart(edges), parents, TIMES.ticks, most)
+    pairs = told(found, TIMES.ticks)
+    assert len(pairs) <= max(most, len(turns))
+    made = TIMES.ticks.round(0, 5.0, pairs).turns
+    assert sorted(turn.node for turn in made) == sorted(node for node, _ in turns)
+    alone = TIMES.ticks.round(0, 5.0, turns)
+    assert TIMES.ticks.round(0, 5.0, pairs).end <= alone.end + 1e-9
+    for node in {node for node, _ in turns}:
+        n_ticks = sum(n for other, n in turns if other == node)
+        assert sum(t.end - t.begin for t in made if t.node == node) >= (
+            n_ticks * TIMES.ticks.tick_s - 1e-9
+        )
+    assert all(turn.begin >= 5.0 - 1e-9 for turn in made)
+    for one, other in combinations(made, 2):
+        if one.end + TIMES.ticks.guard_s <= other.begin + 1e-9:
+            continue
+        if other.end + TIMES.ticks.guard_s <= one.begin + 1e-9:
+            continue
+        near = [{node, *edges.get(node, ())} for node in (one.node, other.node)]
+        assert {one.node, other.node} <= set(edges)
+        assert near[0].isdisjoint(near[1])
+    # Whoever heard of its turn in time still does.
+    nodes = [node for node, _ in turns]
+    first = {node: min(turn.begin for turn in made if turn.node == node) for node in nodes}
+    for node, by in parents.items():
+        if node in first and by in first and nodes.index(by) < nodes.index(node):
+            assert first[by] < first[node]
 
 
 def test_the_robot_in_the_middle_plans():
@@ -394,7 +456,7 @@ def test_what_is_expected_starves_nobody(node, every_s, has_bulk):
 
 
 octet = st.integers(0, 255)
-told = st.one_of(
+whatever = st.one_of(
     st.tuples(st.just("frame"), octet, octet, octet, st.booleans(), st.integers(0, 10**6)),
     st.tuples(
         st.just("grant"),
@@ -411,7 +473,7 @@ told = st.one_of(
 
 
 @law()
-@given(st.lists(told, max_size=40), st.integers(1, 3))
+@given(st.lists(whatever, max_size=40), st.integers(1, 3))
 def test_whatever_is_told_turns_stay_within_bounds(events, own_id):
     access = make_access(params("grant", [1, 2, 3]), own_id, TRAITS, LONGEST_S, Random(1))
     now = 1.0

@@ -1,6 +1,6 @@
 """A team with the policy `grant` on an air of bursts, of which some are lost."""
 
-from itertools import pairwise
+from itertools import islice
 from random import Random
 from typing import NamedTuple
 
@@ -171,9 +171,20 @@ class Team:
 
     def clashes(self, since_s=0.0):
         """Pairs of bursts of which somebody hears both, less than a turnaround apart."""
-        found, bursts = [], sorted(self.bursts)
-        for one, other in pairwise(bursts):
-            near = other.begin < one.end + self.traits.turnaround_s - 1e-6
-            if near and one.begin > since_s and one.src != other.src:
-                found.append((one, other))
-        return found
+        return [each for each in self.beside(since_s) if self.disturb(each[0].src, each[1].src)]
+
+    def beside(self, since_s=0.0):
+        """Pairs of bursts of two robots that are less than a turnaround apart."""
+        bursts = sorted(each for each in self.bursts if each.begin > since_s)
+        for i, one in enumerate(bursts):
+            for other in islice(bursts, i + 1, None):
+                if other.begin >= one.end + self.traits.turnaround_s - 1e-6:
+                    break
+                if one.src != other.src:
+                    yield one, other
+
+    def disturb(self, one, other):
+        """Whether two robots hear each other, or somebody hears both."""
+        return self.hears(one, other) or any(
+            self.hears(one, node) and self.hears(other, node) for node in self.robots
+        )

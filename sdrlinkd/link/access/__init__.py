@@ -27,6 +27,7 @@ from sdrlinkd.link.access.idle import idle_words
 from sdrlinkd.link.access.minislot import LEVELS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
 from sdrlinkd.link.access.requests import Due, Waiting, together, waiting_of, want_of
+from sdrlinkd.link.access.reuse import Apart, stages, told
 from sdrlinkd.link.access.round_plan import Times, before, plan, shares
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S, Tdma
@@ -50,6 +51,7 @@ __all__ = [
     "TDMA_STEPS",
     "Access",
     "AccessParams",
+    "Apart",
     "Auction",
     "ByAuction",
     "ByRequest",
@@ -78,7 +80,9 @@ __all__ = [
     "plan",
     "settle",
     "shares",
+    "stages",
     "together",
+    "told",
     "waiting_of",
     "want_of",
 ]

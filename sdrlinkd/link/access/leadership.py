@@ -19,7 +19,7 @@ LISTEN_S = 1.0
 BETTER_S = 1.0
 """Time in s for which a robot must have been a better root before it takes over."""
 LOST_ROUNDS = 2.2
-"""Rounds without a plan after which the root is lost."""
+"""Rounds without a plan, for each hop to the root, after which the root is lost."""
 MAX_LEVEL = 255
 
 
@@ -133,7 +133,7 @@ class Leadership:
     def _is_lost(self, now: float) -> bool:
         """Whether the root that we follow has told no plan for long."""
         # Plans without a turn of ours are not always passed on to us.
-        lost_s = LOST_ROUNDS * self._round_s if self._has_turn else LISTEN_S
+        lost_s = self.level * LOST_ROUNDS * self._round_s if self._has_turn else LISTEN_S
         return self.follows and now > self._told_at + lost_s
 
     def _is_silent(self, now: float, sensed: Sensed) -> bool:

@@ -6,7 +6,8 @@ from math import inf
 
 from sdrlinkd.link.access.base import Slot, Wish
 from sdrlinkd.link.access.requests import Due, Requests, Waiting
-from sdrlinkd.link.access.round_plan import MOST_TOLD, Times, before, plan, shares
+from sdrlinkd.link.access.reuse import stages, told
+from sdrlinkd.link.access.round_plan import MOST_TOLD, SPARE_TURNS, Times, before, plan, shares
 from sdrlinkd.link.access.team import Team
 from sdrlinkd.link.access.turns import ALMOST_S, Round
 from sdrlinkd.link.qos import Qos
@@ -122,17 +123,21 @@ class Planner:
             times, begin, present, given, wanted, team.places(self._own_id), self._served_at,
             is_open=is_absent and (not wanted or self._is_overdue(ANYBODY, begin)),
         )  # fmt: skip
+        ticks, places = times.ticks, team.places(self._own_id)
+        uses = {node: ticks.count(times.turn_s + each.all_s) for node, each in wanted.items()}
         dues = self._heeded(begin)
+        most = MOST_TOLD - SPARE_TURNS * bool(dues)
+        found = stages(turns, uses, team.apart(), places.parents, ticks, most)
         if dues:
             keep = self._kept(begin, dues[0].qos, given, wanted)
-            turns = before(dues, self._own_id, times.ticks, begin, turns, times.turn_s, keep)
-            turns = turns[:MOST_TOLD]
+            found = before(dues, self._own_id, ticks, begin, found, times.turn_s, keep)
+        turns = told(found, ticks)[:MOST_TOLD]
         self._number = (self._number + 1) % NUMBERS
         made = times.ticks.round(self._number, begin, turns)
         for turn in made.turns:
             self._served_at[turn.node] = turn.begin
             self._requests.given(turn.node, turn.end - turn.begin)
-            if turn.node in given:
+            if turn.node in wanted:
                 longer_s = turn.end - turn.begin - times.turn_s
                 self._note_had(turn.node, wanted[turn.node], longer_s)
         # What comes in the last turn can go on in ours.

@@ -6,11 +6,12 @@ urgent things share a budget of airtime on top of that. Robots that do not hear 
 the robot that passes the plan on to them.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.link.access.requests import Due, Waiting, rank
+from sdrlinkd.link.access.reuse import Stage, beside, told
 from sdrlinkd.link.access.team import Places
 from sdrlinkd.link.access.turns import Ticks
 from sdrlinkd.link.qos import MIDDLE_PRIORITY, Qos
@@ -145,10 +146,10 @@ def before(
     root: int,
     ticks: Ticks,
     begin: float,
-    turns: list[tuple[int, int]],
+    turns: list[Stage],
     turn_s: float,
     kept: Mapping[int, int],
-) -> list[tuple[int, int]]:
+) -> list[Stage]:
     """The turns of a round from `begin` on, changed so that messages find turns when they are due.
 
     `dues` are in order of time. The robot that the first one comes from gets the last turn, so that
@@ -158,21 +159,30 @@ def before(
     If the round is over long before, it stays as it is.
     """
     first, least = dues[0], ticks.count(turn_s)
-    rest = [turn for turn in turns if turn[0] != first.node or turn[1] > 2 * least]
 
-    def end_of(told: list[tuple[int, int]]) -> float:
-        return ticks.round(0, begin, told).end
+    def end_of(found: list[Stage]) -> float:
+        return ticks.round(0, begin, told(found, ticks)).end
+
+    rest = _those(turns, lambda node, length: node != first.node or length > 2 * least)
 
     if end_of(rest) < first.at - 2 * turn_s:
         return turns
     if first.at < begin + 2 * turn_s:
-        rest = [turn for turn in rest if turn[0] in kept]
+        rest = _those(rest, lambda node, _: node in kept)
     for i in range(len(rest) - 1, -1, -1):
-        node, length = rest[i]
         over_s = end_of(rest) - first.at
-        if over_s > 0 and length > least:
-            shortest = min(length, max(least, kept.get(node, 0)))
-            rest[i] = node, max(shortest, length - ticks.count(over_s))
+        if over_s > 0:
+            rest[i] = beside(
+                *(
+                    (
+                        node,
+                        max(
+                            min(length, max(least, kept.get(node, 0))), length - ticks.count(over_s)
+                        ),
+                    )
+                    for node, length in rest[i]
+                )
+            )
     for due in dues:
         at = end_of(rest)
         if due.at > at + 2 * turn_s and due is not first:
@@ -183,6 +193,11 @@ def before(
         if due.at > at:
             # A turn of the root, which it does not use: nobody begins something else.
             pause = max(1, int((due.at - at - ticks.guard_s) / ticks.tick_s))
-            rest.append((root, min(pause, MAX_AIR)))
-        rest.append((due.node, min(ticks.count(due.air_s), MAX_AIR)))
+            rest.append(((root, min(pause, MAX_AIR)),))
+        rest.append(((due.node, min(ticks.count(due.air_s), MAX_AIR)),))
     return rest
+
+
+def _those(turns: Iterable[Stage], suits: Callable[[int, int], bool]) -> list[Stage]:
+    kept = (tuple(turn for turn in stage if suits(*turn)) for stage in turns)
+    return [stage for stage in kept if stage]

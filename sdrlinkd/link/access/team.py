@@ -5,6 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
+from sdrlinkd.link.access.reuse import Apart
 from sdrlinkd.link.paths import Edges, distances
 from sdrlinkd.wire import FAR
 
@@ -43,6 +44,7 @@ class Team:
         self._link_at: dict[tuple[int, int], float] = {}
         self._expired_at = 0.0
         self._places: dict[int, Places] = {}
+        self._apart: Apart | None = None
 
     def heard(self, node: int, at: float) -> None:
         """Note that we hear a robot directly."""
@@ -64,7 +66,7 @@ class Team:
     def learn(self, edges: Edges) -> None:
         """Take the links that LSAs tell."""
         self._lsa_edges = edges
-        self._places.clear()
+        self._changed()
 
     def present(self, now: float) -> list[int]:
         """The other robots that are here, in ascending order: heard, told of, or in LSAs."""
@@ -82,6 +84,12 @@ class Team:
             found = self._places[root] = places_of(root, self._edges())
         return found
 
+    def apart(self) -> Apart:
+        """Which robots may send at once."""
+        if self._apart is None:
+            self._apart = Apart(self._edges())
+        return self._apart
+
     def reach(self, root: int, others: Collection[int]) -> int:
         """Hops from `root` to the farthest of `others`; FAR if that is not known."""
         levels = self.places(root).levels
@@ -93,8 +101,12 @@ class Team:
             self._expired_at = at
             fresh = {each: told for each, told in self._link_at.items() if told > at - PRESENT_S}
             self._link_at = fresh
-            self._places.clear()
+            self._changed()
         self._link_at[link] = at
+
+    def _changed(self) -> None:
+        self._places.clear()
+        self._apart = None
 
     def _edges(self) -> Edges:
         known = {node: dict(links) for node, links in self._lsa_edges.items()}

@@ -51,6 +51,11 @@ class Ticks(NamedTuple):
     tick_s: float
     guard_s: float
 
+    @property
+    def guards(self) -> int:
+        """The guard time in ticks."""
+        return round(self.guard_s / self.tick_s)
+
     def count(self, length_s: float) -> int:
         """How many ticks a turn of at least this length takes."""
         return max(1, math.ceil(length_s / self.tick_s - 1e-6))
