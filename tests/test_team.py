@@ -31,6 +31,26 @@ def test_the_papers_chain_with_its_joystick_loses_nothing():
 
 
 @pytest.mark.slow
+def test_a_chain_of_five_carries_half_of_that_and_asks_for_nothing_that_only_waits():
+    for seed in range(11, 11 + trials(1)):
+        found = carry("grant", seed, 6.0, n=5, load=0.5)
+        assert found.mdr == (1.0, 1.0, 1.0)
+        assert found.asked < 0.05 * found.pdus
+
+
+@pytest.mark.slow
+def test_images_survive_four_hops_that_lose_pdus():
+    """At 6.8 dB, each hop loses something of nearly every image."""
+    found = carry("grant", 5, 6.0, n=5, load=0.5, snr_db=6.8)
+    assert found.asked > found.sent[1]
+    laser, image, joystick = found.mdr
+    assert laser > 0.98
+    assert joystick == 1
+    # A relay that is not named yet does not ask: the first image may lack a part.
+    assert image >= 0.9
+
+
+@pytest.mark.slow
 def test_something_urgent_waits_for_a_round_where_radios_turn_round_slowly():
     for size, most in ((64, 1.2), (2048, 2.3)):
         found = wait_for_turns(size, 3, 20.0)
@@ -46,5 +66,5 @@ def test_a_relay_asks_for_what_it_lacks(policy):
     team = Team((1, 2, 3), ((1, 2), (2, 3)), flows, 1, policy, 288, snr_db=6.4)
     team.simulation.run(21.0)
     (scan,) = team.heard
-    assert team.repeats(2).asked > 5
+    assert team.repeats(2).asked >= 3
     assert scan.mdr == 1

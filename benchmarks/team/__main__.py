@@ -14,6 +14,7 @@ from benchmarks.team.turnaround import wait_for_turns
 def measure(seed: int, quick: bool) -> Iterator[Row]:
     """Measure all rows; `quick` takes a tenth of the trials."""
     yield from _chain(seed, quick)
+    yield from _chain5(seed, quick)
     yield from _turnaround(seed, quick)
     yield from crowd_rows.rows(seed, quick)
     n = 2 if quick else 20
@@ -55,6 +56,26 @@ def _chain(seed: int, quick: bool) -> Iterator[Row]:
         yield Row(
             f"chain3_seed_{name}_D_ms", 1e3 * ours.mean_s[i], "ms", 6.0, "less", ours.sent[i],
             peers={policy: 1e3 * each.mean_s[i] for policy, each in others.items()}, note=note,
+        )  # fmt: skip
+
+
+def _chain5(seed: int, quick: bool) -> Iterator[Row]:
+    duration_s = 5.0 if quick else 60.0
+    ours = carry("grant", seed, duration_s, n=5, load=0.5)
+    tdma = carry("tdma", seed, duration_s if quick else 15.0, n=5, load=0.5)
+    for i, (name, target) in enumerate((("laser", 0.999), ("image", 0.999), ("joystick", 0.999))):
+        yield Row(
+            f"chain5_mdr_{name}", ours.mdr[i], "ratio", target, "more", ours.sent[i],
+            peers={
+                "tdma": tdma.mdr[i],
+                "mean_ms": 1e3 * ours.mean_s[i],
+                "asked_pct": 100 * ours.asked / ours.pdus,
+            },
+            note=(
+                "the same flows over four hops, each half as often; they begin after 8 s, when "
+                "the team has found its routes; policy grant; asked: PDUs of which a robot asked "
+                "another one, of those forwarded"
+            ),
         )  # fmt: skip
 
 

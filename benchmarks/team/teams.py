@@ -142,6 +142,10 @@ class Team:
         """What a robot repeated and asked for."""
         return self._report(node).repeats
 
+    def forwarded(self, node: int) -> int:
+        """How many PDUs of others a robot forwarded."""
+        return self._report(node).relayed.sent
+
     def control_s(self) -> float:
         """Airtime in s of all PDUs that hold only records, and of pulses, so far."""
         return sum(self._report(node).control_airtime_s for node in self.ids)

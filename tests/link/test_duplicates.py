@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sdrlinkd.link import Qos
 from sdrlinkd.link.receive import SequenceTrack
 from tests.laws import law
 
@@ -33,19 +34,28 @@ def test_what_a_relay_sends_may_be_far_behind(behind):
     order = sorted(range(900), key=lambda number: number + behind * (number % 3 > 0))
     track = SequenceTrack()
     for at, number in enumerate(order):
-        assert track.heard(number & 0xFF, number, 1e-3 * at, is_forwarded=True)
+        qos = Qos.BULK if number % 3 else Qos.LATENCY
+        assert track.heard(number & 0xFF, number, 1e-3 * at, forwarded=qos)
         assert track.number == number
         # A robot further on forwards what we have sent it.
         echo = order[max(0, at - 400)]
-        assert not track.heard(echo & 0xFF, echo, 1e-3 * at, is_forwarded=True)
+        assert not track.heard(echo & 0xFF, echo, 1e-3 * at, forwarded=qos)
     assert (track.lost, track.restarts) == (0, 0)
+
+
+def test_what_overtakes_at_a_relay_shows_what_waits_there():
+    track = SequenceTrack()
+    for number in range(300):
+        track.heard(number & 0xFF, number, 1e-3 * number, forwarded=Qos.LATENCY)
+    assert track.heard(400 & 0xFF, 400, 0.3, forwarded=Qos.LATENCY)
+    assert (track.newest, list(track.skipped)) == (400, list(range(300, 400)))
 
 
 def test_what_a_relay_sends_after_a_pause_may_be_far_ahead():
     track = SequenceTrack()
     for number in range(50):
-        track.heard(number, number, 1e-3 * number, is_forwarded=True)
-    assert track.heard(120, 120, 2.0, is_forwarded=True)
+        track.heard(number, number, 1e-3 * number, forwarded=Qos.LATENCY)
+    assert track.heard(120, 120, 2.0, forwarded=Qos.LATENCY)
     assert (track.newest, track.lost) == (120, 70)
 
 

@@ -40,7 +40,8 @@ class Wish(NamedTuple):
     """A request to send a burst of class `qos`, at least `need_s` long, at `earliest` or later.
 
     Where turns are given by request, `waiting` is all that waits, and `dues` are the next messages
-    that the team expects, for the robot that plans. In an auction, `waiting` has the priority.
+    that the team expects, for the robot that plans. `then_s` is the airtime of another burst that
+    should follow in the same turn. In an auction, `waiting` has the priority.
     """
 
     earliest: float
@@ -49,6 +50,7 @@ class Wish(NamedTuple):
     sensed: Sensed
     waiting: Waiting | None = None
     dues: tuple[Due, ...] = ()
+    then_s: float = 0.0
 
 
 class Access(Protocol):

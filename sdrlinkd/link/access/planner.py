@@ -84,17 +84,20 @@ class Planner:
         self._dues = wish.dues
         self._own_since = min(self._own_since, start) if wish.waiting else inf
         end = self._turn_end
-        if wish.waiting is None:
-            end = start + times.turn_s
-        elif not self._turn_began <= start < end:
-            self._turn_began, end = start, start + self._length_s(wish.waiting, start)
+        if not self._turn_began <= start < end:
+            if wish.waiting is None:
+                end = start + times.turn_s
+            else:
+                self._turn_began, end = start, start + self._length_s(wish.waiting, start)
         end = max(end, start + wish.need_s + ALMOST_S)
-        data_end = end - times.turn_s
-        self.tells = end - start <= times.longest_s or start + wish.need_s > data_end
+        data_end, need_end = end - times.turn_s, start + wish.need_s
+        then_s = wish.then_s if need_end + wish.then_s <= data_end else 0.0
+        is_last = not then_s and end - start <= times.longest_s
+        self.tells = is_last or need_end > data_end
         if self.tells:
             return Slot(start, end, end)
         self._turn_end = end
-        until = min(start + times.longest_s, data_end)
+        until = min(start + times.longest_s, data_end - then_s)
         return Slot(start, until, until)
 
     def plan(

@@ -4,13 +4,15 @@ from collections import deque
 from collections.abc import Sequence
 from math import inf
 
+from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import PDU_NUMBERS, nearest_number
 
 WINDOW = 128
 KEEP_S = 1.0
 """Time in s for which a PDU is known again; repeated ones come up to this late."""
-FORWARDED_AHEAD, LATELY_S = 32, 0.25
-"""A PDU that a relay sent, `LATELY_S` or less after another one, is less far ahead than this."""
+STEP_AHEAD, OVERTAKEN, LATELY_S = 32, 96, 0.25
+"""Most that a PDU is ahead which a relay sent, `LATELY_S` or less after another one, if it may also
+be a late one: in the order of its class, and where more urgent ones overtake."""
 REORDERED = 64
 """How far behind the newest one a PDU may be that was sent before the first one heard."""
 NOTHING: Sequence[int] = range(0)
@@ -33,7 +35,7 @@ class SequenceTrack:
     """
 
     __slots__ = (
-        "_anchor", "_doubtful", "_heard", "_leap", "_newest_at", "_order", "_seen",
+        "_anchor", "_doubtful", "_heard", "_leap", "_newest_at", "_order", "_reached", "_seen",
         "_settled", "_told_at", "fills", "is_numbered", "newest", "number", "restarts", "skipped",
     )  # fmt: skip
 
@@ -63,6 +65,8 @@ class SequenceTrack:
         self._doubtful = 0
         # The most losses that one step has shown since the source's boot id was last confirmed.
         self._leap = 0
+        # The highest number that a relay has sent, by class.
+        self._reached: dict[Qos, int] = {}
 
     @property
     def lost(self) -> int:
@@ -72,7 +76,7 @@ class SequenceTrack:
 
     def heard(
         self, seq: int, crc: int, at: float = 0.0, told: int | None = None, *,
-        is_sealed: bool = False, is_forwarded: bool = False, first_at: float | None = None,
+        is_sealed: bool = False, forwarded: Qos | None = None, first_at: float | None = None,
     ) -> bool:  # fmt: skip
         """Note a PDU that came at `at`; False if it is a duplicate.
 
@@ -83,14 +87,14 @@ class SequenceTrack:
         self.skipped, self.fills = NOTHING, False
         if self._order:
             self._forget(at)
-            reach = inf if is_sealed or is_forwarded else WINDOW
+            reach = WINDOW if forwarded is None and not is_sealed else inf
             reach = reach if told is None or is_sealed else 0
             if self._is_known(seq, crc, reach):
                 return False
         if self.newest < 0:
             self._begin(seq if told is None else told, crc, at, is_told=told is not None)
             return True
-        number = self._placed(seq, at, is_forwarded=is_forwarded)
+        number = self._placed(seq, at, forwarded)
         if told is not None:
             number = self._aligned(number, told, at)
         step = number - self.newest
@@ -108,7 +112,7 @@ class SequenceTrack:
         elif number in self._seen and told is not None and self._seen[number][0] == crc:
             return False
         elif number in self._seen or (
-            told is None and not is_forwarded and not self._may_be_late(number)
+            told is None and forwarded is None and not self._may_be_late(number)
         ):
             self._jump(seq, crc, at)
             return True
@@ -116,6 +120,8 @@ class SequenceTrack:
             self.fills = True
             self._heard += number > self._anchor
         self._note(number, crc, at, first_at)
+        if forwarded is not None:
+            self._reached[forwarded] = max(number, self._reached.get(forwarded, number))
         return True
 
     def lacks(self, told: int) -> bool:
@@ -160,6 +166,7 @@ class SequenceTrack:
         self.is_numbered = is_told
         self._told_at = at
         self._heard = self._doubtful = self._leap = 0
+        self._reached.clear()
         self._seen.clear()
         self._order.clear()
         self._note(number, crc, at)
@@ -173,11 +180,21 @@ class SequenceTrack:
         self._heard += 1
         self._note(self.newest, crc, at)
 
-    def _placed(self, seq: int, at: float, *, is_forwarded: bool) -> int:
-        """The number of a PDU by its sequence number."""
-        is_late = is_forwarded and at - self._newest_at < LATELY_S
-        ahead, limit = (seq - self.newest) & 0xFF, FORWARDED_AHEAD if is_late else WINDOW
-        return self.newest + ahead - (0 if ahead < limit else 256)
+    def _placed(self, seq: int, at: float, forwarded: Qos | None) -> int:
+        """The number of a PDU by its sequence number.
+
+        A relay sends the PDUs of each class in order. So one that is older than others of its class
+        is a repeated one. The least urgent ones do not overtake.
+        """
+        ahead = (seq - self.newest) & 0xFF
+        number, late = self.newest + ahead, self.newest + ahead - 256
+        if forwarded is None or not STEP_AHEAD <= ahead < WINDOW:
+            return number if ahead < WINDOW else late
+        if late in self._seen or at - self._newest_at > LATELY_S:
+            return number
+        is_repeated = late <= self._reached.get(forwarded, -1)
+        overtakes = is_repeated and forwarded is not max(self._reached) and ahead < OVERTAKEN
+        return number if overtakes else late
 
     def _aligned(self, number: int, told: int, at: float) -> int:
         """The number of a PDU, which is `number` by its sequence number and `told` by its source.
@@ -204,6 +221,7 @@ class SequenceTrack:
         self.newest += by
         self._anchor += by
         self._seen = {number + by: each for number, each in self._seen.items()}
+        self._reached = {qos: number + by for qos, number in self._reached.items()}
         self._order = deque(number + by for number in self._order)
 
     def _may_be_late(self, number: int) -> bool:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.packing import is_sound, missing_fragments
 from sdrlinkd.link.params import LinkParams, ReassemblyParams
+from sdrlinkd.link.qos import CLASSES
 from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.ages import Ages
 from sdrlinkd.link.receive.completion import Completion
@@ -124,8 +125,9 @@ class Inbox:
         if admitted.number is not None:
             told, repeated_at = admitted.number, first_at
         is_known = admitted.ticks is None and self._commands.has_heard(pdu, admitted.raw, at)
+        forwarded = CLASSES[pdu.qos] if is_forwarded else None
         is_new = not is_known and track.heard(
-            *key[1:], at, told, is_sealed=key[0], is_forwarded=is_forwarded, first_at=repeated_at
+            *key[1:], at, told, is_sealed=key[0], forwarded=forwarded, first_at=repeated_at
         )
         if not is_new:
             neighbor.count_duplicate()

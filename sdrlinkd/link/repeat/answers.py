@@ -30,7 +30,7 @@ MOST_ANNOUNCED = 2
 """How often a PDU is announced in a burst of its own."""
 FORGETS = 0.99
 """Factor on what was repeated for each robot, each time that `expire` is called."""
-FARTHEST_BEHIND, RELAYED_BEHIND = 128, 100
+FARTHEST_BEHIND, RELAYED_BEHIND = 128, 150
 """How far behind the next one of its source a PDU in the clear may be: farther behind, one whose
 REPEAT is lost would look like a new one. A relay knows less of what the source has sent."""
 

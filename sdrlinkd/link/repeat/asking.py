@@ -1,13 +1,13 @@
 """What this robot lacks of others, and when it asks for it."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
 from math import inf
 
 import msgspec
 
 from sdrlinkd.link.receive import PduPlaced
 from sdrlinkd.link.repeat.gaps import Message, inside, parts
+from sdrlinkd.link.repeat.missing import ALONE_S, PATIENCE_S, Missing, Source
 from sdrlinkd.link.schedule import Budget
 from sdrlinkd.reports import RepeatReport
 from sdrlinkd.wire import (
@@ -20,62 +20,11 @@ from sdrlinkd.wire import (
     needs,
 )
 
-PATIENCE_S = 0.005
-"""Time in s for which a PDU may still come out of order."""
-RELAYED_PATIENCE_S = 0.05
-"""The same where a relay may bring it."""
-ALONE_S = 0.05
-"""Time in s for which a question about one PDU waits for spare room; about n PDUs: one n-th."""
-ASKS = 3
-"""How often a PDU is asked for."""
-FIRST_AGAIN_S = 0.04
-LEAST_AGAIN_S, MOST_AGAIN_S = 0.02, 0.3
-"""Limits of the time in s after which a PDU is asked for again."""
-WEIGHT = 0.25
-"""Weight of the newest answer in the mean time of answers."""
 KEEP_S = 1.0
 """Time in s after which its source has forgotten a PDU."""
 MOST_MISSING = 512
 """Most PDUs of one source that are asked for."""
-USEFUL, USEFUL_WEIGHT = 0.05, 0.02
-"""Share of PDUs with messages for us from which a question gets a PDU of its own."""
-
 Holds = Callable[[int, int, int], bool]
-
-
-@dataclass(slots=True)
-class _Missing:
-    since: float
-    next_at: float
-    inside: frozenset[Message]
-    """The messages of which it held a part."""
-    asks_left: int = ASKS
-    others_asked: bool = False
-    """Whether another robot has asked for it."""
-    asked_at: float = -inf
-
-
-@dataclass(slots=True)
-class _Source:
-    missing: dict[int, _Missing] = field(default_factory=dict)
-    last: PduPlaced | None = None
-    has_parity: set[int] = field(default_factory=set)
-    """Topics whose messages have parity."""
-    useful: float = 0.0
-    """Share of its recent PDUs with messages for us."""
-    answer_s: float = FIRST_AGAIN_S / 2
-    """Mean time from a question to its answer."""
-    hears_relays: bool = False
-    heard_at: float = -inf
-    """When its last new PDU came."""
-
-    @property
-    def again_s(self) -> float:
-        return min(max(2 * self.answer_s, LEAST_AGAIN_S), MOST_AGAIN_S)
-
-    def alone_at(self, times: list[float]) -> float:
-        """When a question about PDUs to be asked for at `times` gets a PDU of its own."""
-        return min(times) + ALONE_S / len(times) if self.useful > USEFUL else inf
 
 
 class Asking:
@@ -91,7 +40,7 @@ class Asking:
         """Most octets of a bitmap, so that a question fits into a PDU."""
         self._is_on = share > 0
         self._budget = Budget(share)
-        self._sources: dict[int, _Source] = {}
+        self._sources: dict[int, Source] = {}
         self.due_at = inf
         """When to ask next."""
         self.alone_at = inf
@@ -110,13 +59,12 @@ class Asking:
             return
         source = self._sources.get(pdu.src)
         if source is None:
-            source = self._sources[pdu.src] = _Source()
+            source = self._sources[pdu.src] = Source()
         if source.missing:
             self._filled(source, event)
-        source.heard_at = event.at
         is_useful = event.is_wanted and event.read.control.n_entries < len(pdu.entries)
-        source.useful += USEFUL_WEIGHT * (is_useful - source.useful)
-        source.hears_relays = source.hears_relays or event.read.is_forwarded
+        if source.came(event, is_useful=is_useful):
+            self._look_ahead()
         for record in event.read.records:
             if isinstance(record, Parity):
                 source.has_parity.add(record.topic_id)
@@ -125,7 +73,7 @@ class Asking:
             return
         source.last = event
         is_wanted = event.is_wanted or (before is not None and before.is_wanted)
-        if event.skipped and is_wanted:
+        if event.skipped and is_wanted and source.is_asked:
             self._skipped(source, before, event)
         if source.missing:
             self._drop_bare(source, event)
@@ -187,7 +135,7 @@ class Asking:
                 missing = source.missing.get(number)
                 if missing is not None:
                     self._asked += 1
-                    self._count(source, missing, start)
+                    source.asked(missing, start)
         self._offered, self.is_offered = [], False
         self._look_ahead()
 
@@ -209,29 +157,29 @@ class Asking:
         """The report on what others asked us, and what we asked them."""
         return msgspec.structs.replace(answers, asked=self._asked, given_up=self._given_up)
 
-    def _filled(self, source: _Source, event: PduPlaced) -> None:
+    def _filled(self, source: Source, event: PduPlaced) -> None:
         missing = source.missing.pop(event.number % PDU_NUMBERS, None)
         if missing is not None:
-            if missing.asked_at > -inf and missing.asks_left == ASKS - 1:
-                answer_s = event.at - missing.asked_at
-                source.answer_s += WEIGHT * (answer_s - source.answer_s)
+            source.filled(missing, event.at)
             self._look_ahead()
 
-    def _skipped(self, source: _Source, before: PduPlaced | None, event: PduPlaced) -> None:
-        patience_s = RELAYED_PATIENCE_S if source.hears_relays else PATIENCE_S
+    def _skipped(self, source: Source, before: PduPlaced | None, event: PduPlaced) -> None:
         held: frozenset[Message] = frozenset()
+        is_relayed = source.hears_relays
         for number in event.skipped[-MOST_MISSING:]:
             # A relay holds no messages; it lacks whatever it has to forward.
             is_ours = event.is_ours and before is not None and before.is_ours
             if is_ours and before is not None and number == before.number + 1:
                 held = inside(before, event)
-            source.missing[number % PDU_NUMBERS] = _Missing(event.at, event.at + patience_s, held)
+            source.missing[number % PDU_NUMBERS] = Missing(
+                number, event.at, event.at + source.patience_s, held, is_relayed, is_relayed
+            )
         while len(source.missing) > MOST_MISSING:
             del source.missing[next(iter(source.missing))]
             self._given_up += 1
         self._look_ahead()
 
-    def _drop_bare(self, source: _Source, event: PduPlaced) -> None:
+    def _drop_bare(self, source: Source, event: PduPlaced) -> None:
         """Do not ask for PDUs that hold nothing that is repeated."""
         for record in event.read.records:
             if isinstance(record, Bare):
@@ -239,15 +187,7 @@ class Asking:
                     source.missing.pop(number % PDU_NUMBERS, None)
                 self._look_ahead()
 
-    def _count(self, source: _Source, missing: _Missing, at: float) -> None:
-        missing.asks_left -= 1
-        missing.asked_at = at
-        missing.next_at = at + source.again_s
-        if missing.asks_left <= 0:
-            # Its answer may still come, but nobody asks again.
-            missing.next_at = inf
-
-    def _drop_needless(self, src: int, source: _Source, now: float) -> None:
+    def _drop_needless(self, src: int, source: Source, now: float) -> None:
         for number, each in list(source.missing.items()):
             is_over = bool(each.inside) and not any(
                 self._holds(src, *message) for message in each.inside
@@ -256,7 +196,7 @@ class Asking:
                 del source.missing[number]
                 self._given_up += not is_over
 
-    def _waits(self, source: _Source, missing: _Missing, now: float) -> bool:
+    def _waits(self, source: Source, missing: Missing, now: float) -> bool:
         """Whether to ask later: parity may still come, or the last question would be asked of a
         source of which nothing was heard since the one before.
         """

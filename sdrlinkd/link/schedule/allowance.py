@@ -43,6 +43,11 @@ class Allowance(NamedTuple):
         most = (max(0, n - 1) if each < qos else 0 for each, n in zip(Qos, self.most, strict=True))
         return Allowance(tuple(most))
 
+    def down_to(self, qos: Qos) -> "Allowance":
+        """The allowance for only the classes more urgent than `qos`, if there are any."""
+        most = tuple(n if each < qos else 0 for each, n in zip(Qos, self.most, strict=True))
+        return Allowance(most) if any(most) else self
+
     def fewer(self, n: int) -> "Allowance":
         """This allowance, less `n` PDUs."""
         return self._replace(most=tuple(max(0, each - n) for each in self.most))

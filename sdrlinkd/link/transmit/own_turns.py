@@ -56,9 +56,12 @@ class OwnTurns:
             repeated = self._answers.due_class(now, self._composer.next_number)
         if repeated is None:
             return found
-        # With a PDU that says how old they are.
-        n_pdus = 1 + min(len(self._answers.wanted), MOST_REPEATED)
-        return together(found, Waiting(repeated, MIDDLE_PRIORITY, 0.0, airtime_s(n_pdus)))
+        again_s = self.repeats_s(airtime_s)
+        return together(found, Waiting(repeated, MIDDLE_PRIORITY, 0.0, again_s))
+
+    def repeats_s(self, airtime_s: AirtimeOf) -> float:
+        """Airtime in s for what is to be repeated, with a PDU that says how old it is."""
+        return airtime_s(1 + min(len(self._answers.wanted), MOST_REPEATED))
 
     def dues(self, now: float, airtime_s: AirtimeOf) -> tuple[Due, ...]:
         """The next urgent messages of the team that can be predicted and come soon, in order."""

@@ -142,6 +142,7 @@ class BurstScheduler:
         head, records_due_at = self._outbox.next_class(), records.due_at
         if self._ready_at is None:
             self._ready_at = earliest - self._fit.lead_s
+        repeated = None
         if self._answers.wanted:
             repeated = self._answers.due_class(earliest, composer.next_number)
             # Among equals, new messages and repeats take turns.
@@ -157,14 +158,17 @@ class BurstScheduler:
         qos, mcs = Qos.DEFAULT if head is None else head, rate.lowest
         if rate.adapts and head is not None:
             mcs = rate.mcs(self._outbox.destinations(), qos, earliest)
-        waiting = None
+        waiting, then_s = None, 0.0
         dues: tuple[Due, ...] = ()
+        repeats_next = repeated is not None and head is not None and not self._has_repeated
         if turns is not None:
+            if repeats_next:
+                then_s = turns.repeats_s(partial(airtime_s, mcs))
             waiting = turns.waiting(earliest, partial(airtime_s, mcs))
             dues = turns.dues(earliest, partial(airtime_s, mcs))
         elif self._bids is not None:
             waiting = self._bids.waiting()
-        slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed, waiting, dues))
+        slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed, waiting, dues, then_s))
         if slot is None:
             return None
         start = slot.start
@@ -176,6 +180,9 @@ class BurstScheduler:
         allowance = self._allowance(
             slot, mcs, opportunity, Qos.DEFAULT if start >= records_due_at else None
         )
+        if repeats_next and repeated is not None:
+            # What is more urgent goes first. Then PDUs are repeated, before others of their class.
+            allowance = allowance.down_to(repeated)
         frame = access.frame(start) if access.keeps_schedule else None
         # A schedule's phase is valid only for the planned start.
         is_timed = frame is not None and records.tells_schedule(start)
