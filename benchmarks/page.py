@@ -126,9 +126,19 @@ TEXTS = {
     ),
     "latency": (
         "The assessment of the Sensors 2023 paper as an emulation: 115 bytes 200 times a second"
-        " each way between two processes with clocks of their own. What is emulated: the serial"
-        " line (two pseudo-terminals, paced at 921600 baud), the flight controller, the agent "
-        "and MAVROS."
+        " each way between two processes with clocks of their own. Latencies are true ones, by the"
+        " machine's clock. *corrected_mean* is what the paper's filter makes of the stamps of the "
+        "two clocks; before it converges, nothing is corrected (*corrected_pct*). What is emulated:"
+        " the serial line (paced at 921600 baud), the flight controller, the agent and MAVROS. "
+        "Rows `line_...` can be compared with MAVLink, MAVROS and XRCE, as the line is the same: "
+        "daemons reach it by TCP, the others by pseudo-terminals. Their targets are the paper's "
+        "figures of MAVROS. *on_the_line* is the part of the mean that the line takes. Rows "
+        "`direct_...` and `ether_...` have no line.\n\n"
+        "The last rows close a control loop over links in lock-step, beside the bulk of four "
+        "robots. The controller extrapolates by the age of each input, and by the ages of its "
+        "answers, which the plant reports. Errors are those against a controller at the plant. "
+        "The ratio is the RMS error over that of a controller that ignores ages; "
+        "*mean_age_only* knows the mean of ages only. *fresh* is a faster channel."
     ),
     "adapters": (
         "Odometry of 724 B through the bridge `sdrlink_ros` and a daemon without a modem. The peer "
@@ -262,7 +272,10 @@ def _row(row: Mapping[str, Any]) -> str:
         ok = "ok" if row["ok"] else "**missed**"
     peers = ", ".join(f"{name} {_number(each)}" for name, each in row["peers"].items())
     paper = "" if row["paper"] is None else _number(row["paper"])
-    cells = (f"`{row['name']}`", value, target, ok, peers, paper, f"{row['trials']:,}")
+    name = f"`{row['name']}`"
+    if includes := row.get("includes"):
+        name += f": {includes}"
+    cells = (name, value, target, ok, peers, paper, f"{row['trials']:,}")
     return "| " + " | ".join(each.replace("|", "\\|") for each in cells) + " |"
 
 

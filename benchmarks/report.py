@@ -3,15 +3,16 @@
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from benchmarks.absent import attempt, told
 from benchmarks.kept import circumstances, keep
 from benchmarks.processes import Stolen
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 
+Found = TypeVar("Found")
 SIGNS = {"more": "≥", "less": "≤"}
 
 
@@ -39,6 +40,10 @@ class Row:
     note: str = ""
     like_for_like: float | None = None
     """The value scaled by a peer's speed here against the targets' machine; only reported."""
+    exact: bool = False
+    """Whether the same seed gives the same value on every machine: lock-step, or calculation."""
+    includes: str = ""
+    """What the measured path consists of, where rows of one table differ in it."""
 
     @property
     def ok(self) -> bool:
@@ -46,6 +51,14 @@ class Row:
         if self.target is None:
             return True
         return self.value >= self.target if self.better == "more" else self.value <= self.target
+
+
+def exactly(found: Iterable[Found]) -> Iterator[Found]:
+    """Mark the rows as exact; drawings pass as they are."""
+    for each in found:
+        if isinstance(each, Row):
+            each.exact = True
+        yield each
 
 
 def main(
@@ -125,7 +138,7 @@ def table_of(benchmark: str, rows: list[Row]) -> FittedTable:
             here += f" ({row.like_for_like:,.4g})"
         target = "" if row.target is None else f"{SIGNS[row.better]} {row.target:,.4g}"
         table.add(
-            row.name,
+            f"{row.name}: {row.includes}" if row.includes else row.name,
             here,
             target if row.ok else f"{target} missed",
             ", ".join(f"{name} {value:,.4g}" for name, value in row.peers.items()),

@@ -70,12 +70,12 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
                 "payload_octets": equal_payload(size - SEAL_OVERHEAD, 1),
                 "in_the_clear": equal_payload(size, 1),
             },
-            note="payload of a PDU with one entry, beside that in the clear",
+            note="payload of a PDU with one entry, beside that in the clear", exact=True,
         )  # fmt: skip
     yield Row(
         "overhead_octets", SEAL_OVERHEAD, "B", 25.0, "less", 1,
         peers={"wfb-ng": 25, "Reticulum": 48},
-        note="octets that a PDU loses; peers by their formats",
+        note="octets that a PDU loses; peers by their formats", exact=True,
     )  # fmt: skip
 
 

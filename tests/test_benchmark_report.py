@@ -13,7 +13,7 @@ from benchmarks.absent import PeerError, attempt
 from benchmarks.latency import rows
 from benchmarks.peers.modems import gnu_radio
 from benchmarks.pound import beside
-from benchmarks.report import Row, table_of
+from benchmarks.report import Drawing, Row, exactly, table_of
 from sdrlinkd.process import ProcessError
 from sdrlinkd.tables import screen_console
 
@@ -48,6 +48,25 @@ def test_a_miss_is_printed_as_a_miss():
     assert "173.2 Msps (226.7)" in slow
     assert "≥ 200 missed" in slow
     assert "missed" not in fast
+
+
+def test_a_table_tells_what_its_rows_include():
+    console = screen_console()
+    with console.capture() as printed:
+        console.print(
+            table_of("x", [Row("a", 1.0, "s", None, "less", 1, includes="the line"),
+                           Row("b", 1.0, "s", None, "less", 1)])
+        )  # fmt: skip
+    a, b = printed.get().splitlines()[-3:-1]
+    assert "a: the line" in a
+    assert ":" not in b
+
+
+def test_rows_are_exact_only_where_somebody_says_so():
+    row, drawing = Row("x", 1.0, "s", None, "less", 1), Drawing("picture", {})
+    assert not row.exact
+    assert list(exactly([row, drawing])) == [row, drawing]
+    assert row.exact
 
 
 def run(monkeypatch, capsys, measure):

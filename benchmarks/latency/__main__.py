@@ -2,8 +2,9 @@
 
 `python -m benchmarks.latency [--quick] [--json] [--no-peers]`.
 
-What is emulated: the serial line (two pseudo-terminals, paced at 921600 baud), the FCU (a process
-with a clock of its own), the agent and MAVROS (Python, as all of it).
+What is emulated: the serial line (paced at 921600 baud), the FCU (a process with a clock of its
+own), the agent and MAVROS (Python, as all of it). Daemons reach the line by TCP, as they would
+through ser2net, where the others have pseudo-terminals.
 `--keep` keeps the rows, and what the figures show, for docs/benchmarks.md.
 """
 
@@ -30,7 +31,7 @@ def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row | Dr
     yield from rows.shares(seed, 20.0 if quick else 120.0)
     yield from rows.under_stress(seed, seconds, passes, beside)
     yield from rows.more_topics(seed, 3.0 if quick else 6.0, quick, beside)
-    yield rows.correction(seed, 10 if quick else 100)
+    yield from rows.corrections(seed, 2 if quick else 20)
     if not (quick or no_peers):
         yield pictures.drawing(found)
 

@@ -41,7 +41,7 @@ def draw(shows: Mapping[str, Any]) -> None:
         series, density = panels[:, 0]
         by_name = shows["ways"][way]
         for (name, latencies), look in zip(
-            by_name.items(), looks(by_name, "direct").values(), strict=True
+            by_name.items(), looks(by_name, "line").values(), strict=True
         ):
             latencies_ms = np.array(latencies, float)
             if len(latencies_ms) < 2:

@@ -7,7 +7,8 @@ from statistics import median
 import numpy as np
 
 from benchmarks.absent import attempt
-from benchmarks.latency import airtime, clocks, control, lockstep
+from benchmarks.latency import airtime, clocks, lockstep, loop
+from benchmarks.latency.control import Knows
 from benchmarks.latency.correction import Direction
 from benchmarks.latency.session import Session, run
 from benchmarks.peers.latency.table import PEERS
@@ -15,7 +16,7 @@ from benchmarks.report import Row
 from sdrlinkd.config import ModemParams
 from sdrlinkd.modem import Airtimes
 
-OURS = ("direct", "ether")
+OURS = ("line", "direct", "ether")
 TOLD = ("mavlink", "mavros", "xrce", *OURS)
 BESIDE = ("mavlink", "xrce")
 """Peers that are also measured under stress and with more topics."""
@@ -25,11 +26,16 @@ PAPER_MS = {
     ("mavros", "fwd"): (1.678, 0.560),
     ("mavros", "bwd"): (2.133, 1.020),
 }
-"""Table 3: mean and standard deviation; its MAVLink is the one with MAVROS."""
-TARGET_MS = {"direct": (1.33, 0.16)}
-ANY_MS = 1e3
-"""Limit for rows without a real target: peers, and totals of which only a part has one."""
+"""Table 3: mean and standard deviation; its MAVLink is the one with MAVROS.
+
+MAVROS' figures are the target of `line`: the line alone takes longer for a PDU than XRCE's mean.
+"""
+SIZE = 115
+PERIOD_MS = 5.0
+"""Between two messages of a topic."""
 SHARE_PCT = 2.0
+LOOP_S = 6.0
+KNOWS: tuple[Knows, ...] = ("age", "mean", "nothing")
 
 
 def sessions(
@@ -58,38 +64,58 @@ def ways(session: Session) -> dict[str, Direction]:
 
 
 def table(found: dict[str, list[Session]]) -> Iterator[Row]:
-    """Mean and standard deviation each way, as medians of the passes."""
+    """Mean and standard deviation each way of true latencies, as medians of the passes.
+
+    `on_the_line` is the part of the mean that the line takes for one message. Where the paper's
+    filter converged, the means by its correction stand beside them.
+    """
     for name, passes in found.items():
         for way in ("fwd", "bwd"):
             each = [ways(session)[way] for session in passes]
             n = sum(one.n_heard for one in each)
             peers = {
-                "true_mean": median(_ms(one.true_s, np.mean) for one in each),
-                "true_p50": median(_ms(one.true_s, np.median) for one in each),
-                "true_p99": median(_ms(one.true_s, _p99) for one in each),
-                "filter_error_us": median(_us(one.filter_error_s) for one in each),
+                "p50": median(_ms(one.true_s, np.median) for one in each),
+                "p99": median(_ms(one.true_s, _p99) for one in each),
                 "lost": float(sum(one.n_sent - one.n_heard for one in each)),
+                **_corrected(each),
             }
+            if (line_s := PEERS[name].on_the_line_s(SIZE)) is not None:
+                peers["on_the_line"] = 1e3 * line_s
             paper = PAPER_MS.get((name, way), (None, None))
-            target = TARGET_MS.get(name, (ANY_MS, ANY_MS))
-            for what, of, number in (("mean", np.nanmean, 0), ("std", np.nanstd, 1)):
-                value = median(_ms(_corrected(one), of) for one in each)
+            target = PAPER_MS["mavros", way] if name == "line" else (None, None)
+            for what, of, number in (("mean", np.mean, 0), ("std", np.std, 1)):
+                value = median(_ms(one.true_s, of) for one in each)
                 yield Row(f"{name}_115B_200hz_{what}_ms_{way}", value, "ms", target[number],
                           "less", n, peers if what == "mean" else {},
-                          paper=paper[number], note=PEERS[name].of)  # fmt: skip
+                          paper=paper[number], includes=PEERS[name].of)  # fmt: skip
+
+
+def _corrected(each: Sequence[Direction]) -> dict[str, float]:
+    """Latencies as the paper corrects them, without those before its filter converged."""
+    known = [one.corrected_s[np.isfinite(one.corrected_s)] for one in each]
+    n_known, n = sum(map(len, known)), sum(one.n_heard for one in each)
+    found = {"corrected_pct": 100 * n_known / max(1, n)}
+    if n_known:
+        found["corrected_mean"] = median(_ms(one, np.mean) for one in known if len(one))
+        found["filter_error_us"] = median(
+            _us(one.filter_error_s) for one in each if len(one.filter_error_s)
+        )
+    return found
 
 
 def load(found: dict[str, list[Session]]) -> Iterator[Row]:
-    """CPU time and memory of everything between the two programs, and of the programs."""
+    """CPU time and memory of all programs, without the emulated line, which stands for hardware."""
     for what, unit in (("cpu_share", "cores"), ("rss_mib", "MiB")):
-        totals = {
-            name: median(sum(getattr(each, what).values()) for each in passes)
+        peers = {
+            name: median(
+                sum(value for process, value in getattr(each, what).items() if process != "line")
+                for each in passes
+            )
             for name, passes in found.items()
         }
-        if "direct" in totals:
-            peers = {name: value for name, value in totals.items() if name != "direct"}
-            yield Row(f"direct_{what}", totals["direct"], unit, max([*peers.values(), 1.0]),
-                      "less", len(found["direct"]), peers)  # fmt: skip
+        if "line" in peers:
+            yield Row(f"line_{what}", peers.pop("line"), unit, None, "less", len(found["line"]),
+                      peers, includes=PEERS["line"].of)  # fmt: skip
 
 
 def beyond_air(found: dict[str, list[Session]]) -> Iterator[Row]:
@@ -111,8 +137,9 @@ def by_the_air(seed: int, seconds: float) -> Iterator[Row]:
     found = lockstep.measure(seed, seconds)
     late_ms, n = 1e3 * found.latencies_s, len(found.latencies_s)
     yield Row("ether_115B_200hz_lockstep_std_ms", float(late_ms.std()), "ms", 0.08, "less",
-              n, {"mean": float(late_ms.mean()), "airtime": 1e3 * found.airtime_s})  # fmt: skip
-    yield Row("age_rms_us_lockstep", _us(found.age_errors_s), "µs", 20.0, "less", n)
+              n, {"mean": float(late_ms.mean()), "airtime": 1e3 * found.airtime_s},
+              exact=True)  # fmt: skip
+    yield Row("age_rms_us_lockstep", _us(found.age_errors_s), "µs", 20.0, "less", n, exact=True)
 
 
 def by_the_clock(seconds: float) -> Iterator[Row]:
@@ -142,33 +169,37 @@ def shares(seed: int, seconds: float) -> Iterator[Row]:
         found = airtime.measure(case, seed, seconds)
         peers = {"period_s": found.period_s, "all_pct": found.all_pct}
         peers |= {f"receipts_{fate}": float(n) for fate, n in found.verdicts.items()}
-        yield Row(name, found.control_pct, "%", SHARE_PCT, "less", round(seconds), peers)
+        yield Row(name, found.control_pct, "%", SHARE_PCT, "less", round(seconds), peers,
+                  exact=True)  # fmt: skip
 
 
 def more_topics(
     seed: int, seconds: float, quick: bool, beside: Sequence[str] = BESIDE
 ) -> Iterator[Row]:
-    """The paper's future work: latency with more topics, 200 Hz each."""
+    """The paper's future work: latency with more topics, 200 Hz each.
+
+    Four topics are more than the line carries, whatever the system.
+    """
     peers: dict[str, float] = {}
     for n_topics in (2,) if quick else (2, 4, 7):
         for name, each in sessions(
-            seed, seconds, 1, n_topics=n_topics, of=(*beside, "direct")
+            seed, seconds, 1, n_topics=n_topics, of=(*beside, "line", "direct")
         ).items():
             peers[f"{name}_{n_topics}"] = _ms(each[0].forward.true_s, np.mean)
             peers[f"{name}_{n_topics}_lost_pct"] = 100 * (
                 1 - each[0].forward.n_heard / max(1, each[0].forward.n_sent)
             )
-    shown = "direct_2" if quick else "direct_4"
-    if shown in peers:
-        yield Row("direct_topics_at_once_mean_ms", peers.pop(shown), "ms", 10.0, "less", 1, peers,
-                  note=f"{shown.rpartition('_')[2]} topics of 200 Hz each way")  # fmt: skip
+    if "line_2" in peers:
+        yield Row("line_topics_at_once_mean_ms", peers.pop("line_2"), "ms", PERIOD_MS, "less", 1,
+                  peers, note="2 topics of 200 Hz each way",
+                  includes=PEERS["line"].of)  # fmt: skip
 
 
 def under_stress(
     seed: int, seconds: float, passes: int, beside: Sequence[str] = BESIDE
 ) -> Iterator[Row]:
     """Latency with a busy program on every core."""
-    found = sessions(seed, seconds, passes, stress=True, of=(*beside, "direct"))
+    found = sessions(seed, seconds, passes, stress=True, of=(*beside, "line", "direct"))
     means = {
         name: median(_ms(each.forward.true_s, np.mean) for each in of) for name, of in found.items()
     }
@@ -176,26 +207,44 @@ def under_stress(
         f"{name}_std": median(_ms(each.forward.true_s, np.std) for each in of)
         for name, of in found.items()
     }
-    if "direct" in means:
-        yield Row("direct_under_stress_mean_ms", means.pop("direct"), "ms", 3.0, "less",
-                  len(found["direct"]), means | stds)  # fmt: skip
+    if "line" in means:
+        yield Row("line_under_stress_mean_ms", means.pop("line"), "ms", 3.0, "less",
+                  len(found["line"]), means | stds, includes=PEERS["line"].of)  # fmt: skip
 
 
-def correction(seed: int, runs: int) -> Row:
-    """A control loop that knows the age of its measurements, compared with one that does not."""
-    mean_s, seconds = 0.03, 3.0
-    rms = {
-        corrected: control.rms_mv(seed, mean_s, seconds, runs, corrected=corrected)
-        for corrected in (True, False)
-    }
-    return Row("loop_error_corrected_ratio", rms[True] / rms[False], "", 0.7, "less", runs,
-               {"corrected_mv": rms[True], "uncorrected_mv": rms[False]},
-               note=f"one-way latency {1e3 * mean_s:g} ms on average")  # fmt: skip
+def corrections(seed: int, runs: int) -> Iterator[Row]:
+    """A control loop whose controller knows the ages of its inputs, over one that does not."""
+    for name, case, target in (
+        ("loop_error_corrected_ratio", loop.OLD, 0.7),
+        ("loop_error_corrected_ratio_fresh", loop.FRESH, None),
+    ):
+        found = {
+            knows: [loop.run_loop(case, knows, seed + i, LOOP_S) for i in range(runs)]
+            for knows in KNOWS
+        }
+        rms_v = {knows: np.array([_rms(run.error_v) for run in of]) for knows, of in found.items()}
+        own, ignored = rms_v["age"], rms_v["nothing"]
+        inputs_s, answers_s = (
+            np.concatenate([getattr(run, ages) for run in found["age"]])
+            for ages in ("inputs_s", "answers_s")
+        )
+        peers = {
+            "corrected_mv": 1e3 * _rms(own),
+            "ages_ignored_mv": 1e3 * _rms(ignored),
+            "mean_age_only_mv": 1e3 * _rms(rms_v["mean"]),
+            "worst_ratio": float((own / ignored).max()),
+            "input_age_ms": _ms(inputs_s, np.mean),
+            "input_age_std_ms": _ms(inputs_s, np.std),
+            "answer_age_ms": _ms(answers_s, np.mean),
+            "answer_age_std_ms": _ms(answers_s, np.std),
+        }
+        yield Row(name, _rms(own) / _rms(ignored), "", target, "less", runs, peers, exact=True,
+                  note=f"{loop.ROBOTS} robots, {case.policy}, {case.rate_hz / 1e6:g} Msps",
+                  )  # fmt: skip
 
 
-def _corrected(one: Direction) -> np.ndarray:
-    """Corrected latencies; true ones if the paper's filter never converged."""
-    return one.corrected_s if np.isfinite(one.corrected_s).any() else one.true_s
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _ms(values: np.ndarray, of: object) -> float:

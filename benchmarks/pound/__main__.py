@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.absent import attempt
 from benchmarks.pound import beside, limits, pictures, realtime, rows, tables
-from benchmarks.report import Drawing, Row, main
+from benchmarks.report import Drawing, Row, exactly, main
 
 PHASES, QUICK_PHASES = 10, 2
 
@@ -34,14 +34,14 @@ def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row | Dr
     two_hops = beside.tables(peers, flows[1], True, seed)
     mbps = beside.bandwidths(peers, sizes, 2.0 if quick else 4.0)
     loops = beside.loops(peers, phases)
-    yield from rows.two_nodes(seed, quick, one_hop)
-    yield from rows.three_nodes(seed, quick, two_hops)
-    yield from rows.bandwidth(seed, quick, mbps)
-    yield from rows.outage(seed, quick, {} if quick else beside.recoveries(peers))
-    yield from rows.control_loop(seed, phases, loops)
-    yield from rows.urgent(seed, quick)
+    yield from exactly(rows.two_nodes(seed, quick, one_hop))
+    yield from exactly(rows.three_nodes(seed, quick, two_hops))
+    yield from exactly(rows.bandwidth(seed, quick, mbps))
+    yield from exactly(rows.outage(seed, quick, {} if quick else beside.recoveries(peers)))
+    yield from exactly(rows.control_loop(seed, phases, loops))
+    yield from exactly(rows.urgent(seed, quick))
     yield from rows.costs(seed, quick)
-    yield from rows.plan(seed, quick)
+    yield from exactly(rows.plan(seed, quick))
     with attempt("daemons in real time"):
         yield from realtime.rows(seed, quick)
     if not (quick or no_peers):

@@ -90,7 +90,7 @@ def _fresh_again(trace: Trace, end: float, limit_s: float) -> float:
 def urgent_waits_ms(seed: int, quick: bool) -> tuple[Times, float, float]:
     """(ages of urgent messages at random times while 10 MB wait, own airtime, the bound) in ms."""
     air = Air()
-    seconds = 1.5 if quick else 13.0
+    seconds = 6.0 if quick else 13.0
     bulk = Flow("bulk", 50_000, 1e-5, BULK_BYTES // 50_000, "bulk")
     rng = np.random.default_rng(seed)
     n = int(seconds * 20)

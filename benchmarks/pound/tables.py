@@ -35,7 +35,7 @@ CASES = (Case("jitter_0.5ms", 5e-4), Case("jitter_2ms", 2e-3), DRIFTING)
 def flows(n_hops: int, case: Case, seed: int, quick: bool) -> tuple[Flow, Flow]:
     """(laser, image), with random phases."""
     rng = np.random.default_rng(seed)
-    n = LASERS // 12 if quick else LASERS
+    n = LASERS // 2 if quick else LASERS
     image_s = IMAGE_S if n_hops == 1 else IMAGE_3N_S
     laser = Flow(
         "laser", KB, LASER_S, n, "latency", case.jitter_s, case.drift, rng.uniform(0, LASER_S)

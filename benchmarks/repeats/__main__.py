@@ -67,7 +67,7 @@ def _row(
             "air_pct": 100 * ours.air_share,
             "repeats_pct": 100 * ours.repeats_share,
         },
-        note=f"100 messages/s; repeat.share = {share:g}",
+        note=f"100 messages/s; repeat.share = {share:g}", exact=True,
     )  # fmt: skip
 
 
@@ -81,7 +81,7 @@ def _images(n: int, seed: int) -> Row:
             "no_repeats": none.within(2.0), "air_pct": 100 * ours.air_share,
             "repeats_pct": 100 * ours.repeats_share,
         },
-        note="images of 40 kB in 165 fragments, without parity",
+        note="images of 40 kB in 165 fragments, without parity", exact=True,
     )  # fmt: skip
 
 
@@ -96,7 +96,7 @@ def _twice(n: int, seed: int) -> Row:
     return Row(
         "urgent_lost_twice_pct", 100 - ours.within(SHORT_LIFE_S), "%", 0.02, "less", n,
         peers={"once": 100 - none.within(SHORT_LIFE_S), "air_pct": 100 * ours.air_share},
-        note="0.7 % of the bursts are lost; lifespan 50 ms",
+        note="0.7 % of the bursts are lost; lifespan 50 ms", exact=True,
     )  # fmt: skip
 
 

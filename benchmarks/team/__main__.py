@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterator
 from statistics import median
 
-from benchmarks.report import Row, main
+from benchmarks.report import Row, exactly, main
 from benchmarks.team import crowd_rows, rtwmp_rows
 from benchmarks.team.chain import Carried, carry
 from benchmarks.team.healing import PERIOD_S, heal
@@ -13,10 +13,10 @@ from benchmarks.team.turnaround import wait_for_turns
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
     """Measure all rows; `quick` takes a tenth of the trials."""
-    yield from _chain(seed, quick)
-    yield from _chain5(seed, quick)
-    yield from _turnaround(seed, quick)
-    yield from crowd_rows.rows(seed, quick)
+    yield from exactly(_chain(seed, quick))
+    yield from exactly(_chain5(seed, quick))
+    yield from exactly(_turnaround(seed, quick))
+    yield from exactly(crowd_rows.rows(seed, quick))
     n = 2 if quick else 20
     for name, to_all in (("reroute_s", False), ("reroute_to_all_s", True)):
         found = [heal(seed + i, to_all=to_all) for i in range(n)]
@@ -32,8 +32,9 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
                 f"five robots, {1 / PERIOD_S:g} Hz over three hops, tdma; the worst of all trials: "
                 "from the death of the relay until the first message that was sent after it"
             ),
+            exact=True,
         )  # fmt: skip
-    yield from rtwmp_rows.rows(seed, quick)
+    yield from exactly(rtwmp_rows.rows(seed, quick))
 
 
 def _chain(seed: int, quick: bool) -> Iterator[Row]:

@@ -6,7 +6,7 @@
 import sys
 from collections.abc import Iterator
 
-from benchmarks.report import Drawing, Row, main
+from benchmarks.report import Drawing, Row, exactly, main
 from benchmarks.timesync import moving_rows, pictures, rows
 
 HZ = 5.0
@@ -19,14 +19,15 @@ def measure(seed: int, quick: bool) -> Iterator[Row | Drawing]:
     runs, stepped = (4, 1) if quick else (40, 8)
     held = rows.Tally()
     found = rows.precision(seed, runs, HZ, held)
-    yield from rows.precision_rows(found, HZ)
-    yield rows.steps(seed, stepped, HZ, held)
-    yield from rows.hostile(seed, runs, HZ, held)
+    yield from exactly(rows.precision_rows(found, HZ))
+    yield from exactly([rows.steps(seed, stepped, HZ, held)])
+    yield from exactly(rows.hostile(seed, runs, HZ, held))
     yield Row("bound_holds_pct", held.percent, "%", 99.9, "more", held.all,
-              note="all scenarios, without the 5 s after each step")  # fmt: skip
-    yield from moving_rows.measure(seed, *((1, QUICK_S) if quick else (8, float("inf"))))
-    yield rows.sample_clocks(seed, 15.0 if quick else 60.0)
-    yield from rows.recorded()
+              note="all scenarios, without the 5 s after each step", exact=True)  # fmt: skip
+    of_moving = (1, QUICK_S) if quick else (8, float("inf"))
+    yield from exactly(moving_rows.measure(seed, *of_moving))
+    yield from exactly([rows.sample_clocks(seed, 15.0 if quick else 60.0)])
+    yield from exactly(rows.recorded())
     if not quick:
         yield pictures.drawing(found, HZ)
 

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import socket
 import time
 
 import pytest
@@ -70,11 +71,19 @@ def test_a_busy_line_drops_what_its_buffer_cannot_hold():
     assert pacer.dropped == 4
 
 
-def test_the_line_carries_any_bytes_both_ways_no_faster_than_its_rate():
+def opened(place):
+    """A device by its path, or the port of a serial server."""
+    if place.isdigit():
+        return socket.create_connection(("127.0.0.1", int(place))).detach()
+    return os.open(place, os.O_RDWR | os.O_NOCTTY)
+
+
+@pytest.mark.parametrize("kind", [(), ("tcp",)])
+def test_the_line_carries_any_bytes_both_ways_no_faster_than_its_rate(kind):
     data = bytes(range(256)) * 4
     with contextlib.ExitStack() as stack:
-        line = start_module(stack, "line", "benchmarks.peers.latency.wire", str(BAUD))
-        devices = [os.open(path, os.O_RDWR | os.O_NOCTTY) for path in json.loads(line.line())]
+        line = start_module(stack, "line", "benchmarks.peers.latency.wire", str(BAUD), *kind)
+        devices = [opened(place) for place in json.loads(line.line())]
         for source, sink in (devices, devices[::-1]):
             begin, got = time.monotonic(), b""
             os.write(source, data)
@@ -82,8 +91,8 @@ def test_the_line_carries_any_bytes_both_ways_no_faster_than_its_rate():
                 got += os.read(sink, 4096)
             assert got == data
             assert time.monotonic() - begin >= len(data) * BYTE_S
-        for device in devices:
-            os.close(device)
         line.close_input()
         late = json.loads(line.line())
+        for device in devices:
+            os.close(device)
     assert min(late) >= 0

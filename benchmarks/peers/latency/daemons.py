@@ -1,6 +1,6 @@
 """The daemons of this benchmark, and their configuration."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from contextlib import AbstractContextManager
 from typing import NamedTuple
 
@@ -43,10 +43,13 @@ class Air(NamedTuple):
 
 
 def running(
-    air: Air, robots: Collection[int], topics: Collection[str]
+    air: Air,
+    robots: Collection[int],
+    topics: Collection[str],
+    own: Mapping[int, str] | None = None,
 ) -> AbstractContextManager[daemons.Running]:
-    """Run daemons, from when each hears another. Raises PeerError."""
+    """Run daemons, from when each hears another; `own`: TOML of single robots. Raises PeerError."""
     parts = [ROBOT.format(robot=robot, ppm=PPM[robot]) for robot in robots]
     scenario = SCENARIO.format(**air._asdict()) + "".join(parts)
     config = CONFIG.format(**air._asdict())
-    return daemons.running(air.backend, robots, topics, config, scenario, precede=True)
+    return daemons.running(air.backend, robots, topics, config, scenario, precede=True, own=own)

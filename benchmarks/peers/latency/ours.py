@@ -1,19 +1,29 @@
-"""Our own daemons as a peer: programs on the bus, with looped-back PDUs or an air between."""
+"""Our own daemons as a peer: programs on the bus; between daemons a line, an air, or nothing."""
 
+import json
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from benchmarks.peers.latency.daemons import Air, running
 from benchmarks.peers.latency.job import ANSWERED, ASKED, FIRST_TOPIC, REPLY, REQUEST, Address
-from benchmarks.peers.latency.way import End, Way
+from benchmarks.peers.latency.pacer import BITS_PER_BYTE
+from benchmarks.peers.latency.way import End, Way, late_s
+from benchmarks.processes import precede, start_module
 from sdrlinkd.client import Publisher, Subscriber
 
 AIR = Air()
 ROBOT = {"companion": 1, "fcu": 2}
 SHARED = "direct"
 """With this link both ends are programs of one robot."""
-TOPICS = {SHARED: 7, "ether": 15}
+TOPICS = {SHARED: 7, "ether": 15, "line": 15}
 """Number of topics each way: of one registry for both ways, or of one each."""
+PDU_OVERHEAD = 26
+"""Octets of a PDU with one message beside it: header, entry, STAMP and CRC."""
+LINE = """[gnuradio]
+transport = "tcp"
+send = "127.0.0.1:{port}"
+rate_bit_s = {rate_bit_s}
+"""
 
 
 class BusEnd:
@@ -70,3 +80,26 @@ def ether(_: int) -> Iterator[Way]:
             for side, robot in ROBOT.items()
         }
         yield Way(ends, daemons.processes)
+
+
+@contextmanager
+def line(baud: int, size: int) -> Iterator[Way]:
+    """A daemon for each end, and a serial line between; PDUs have room for one message.
+
+    The PDUs are octets without framing. The daemons find them by their CRC, and send the next one
+    when the line has carried the last. The line is the one of the other peers.
+    """
+    names = [f"t{i}" for i in range(TOPICS["line"])]
+    with ExitStack() as stack:
+        wire = start_module(stack, "line", "benchmarks.peers.latency.wire", str(baud), "tcp")
+        precede(wire, real_time=True)
+        own = {
+            robot: LINE.format(port=port, rate_bit_s=baud * 8 / BITS_PER_BYTE)
+            for robot, port in zip(ROBOT.values(), json.loads(wire.line()), strict=True)
+        }
+        air = AIR._replace(backend="gnuradio", pdu_size=size + PDU_OVERHEAD)
+        daemons = stack.enter_context(running(air, list(ROBOT.values()), names, own))
+        ends = {
+            side: End(Address("line", str(daemons.folders[robot]))) for side, robot in ROBOT.items()
+        }
+        yield Way(ends, [wire, *daemons.processes], lambda: late_s(wire))

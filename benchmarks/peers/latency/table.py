@@ -8,9 +8,9 @@ from typing import NamedTuple
 from benchmarks import environments
 from benchmarks.peers.latency import ours
 from benchmarks.peers.latency.job import Address
-from benchmarks.peers.latency.way import End, Way
+from benchmarks.peers.latency.pacer import BITS_PER_BYTE
+from benchmarks.peers.latency.way import End, Way, late_s
 from benchmarks.processes import precede, start_module
-from sdrlinkd.process import Process
 
 BAUD = 921_600
 """The rate of PX4's TELEM2 for a companion computer."""
@@ -25,6 +25,12 @@ class Peer(NamedTuple):
     """Opens a way for messages of the given size in bytes."""
     environment: str = ""
     """The virtual environment that it needs."""
+    overhead: int | None = None
+    """Octets on the line beside a message's payload; None: there is no line."""
+
+    def on_the_line_s(self, size: int) -> float | None:
+        """The time that the line takes for a message of `size` bytes; None: there is no line."""
+        return None if self.overhead is None else (size + self.overhead) * BITS_PER_BYTE / BAUD
 
 
 def serial(
@@ -47,26 +53,38 @@ def serial(
                 between.append(bridge)
                 precede(bridge, real_time=False)
                 ends["companion"] = End(Address("local", bridge.line()))
-            yield Way(ends, between, lambda: _late_s(line))
+            yield Way(ends, between, lambda: late_s(line))
 
     return open_way
 
 
-def _late_s(line: Process) -> list[float]:
-    """The delays that the line reports at its end."""
-    line.close_input()
-    late_s: list[float] = json.loads(line.line())
-    return late_s
-
-
 PEERS: dict[str, Peer] = {
-    "mavlink": Peer("MAVLink 2, parsed within the node", serial("mavlink", "mavlink"), "mavlink"),
-    "mavros": Peer(
-        "MAVLink 2, MAVROS between line and node", serial("mavlink", "mavlink", "mavros"), "mavlink"
+    "mavlink": Peer(
+        "MAVLink 2, parsed within both programs; the line",
+        serial("mavlink", "mavlink"),
+        "mavlink",
+        12,
     ),
-    "direct": Peer("sdrlinkd, PDUs straight back", ours.direct),
-    "ether": Peer("sdrlinkd, two daemons on a simulated air", ours.ether),
-    "xrce": Peer("Micro XRCE-DDS, its agent between line and node", serial("xrce", hop="agent")),
+    "mavros": Peer(
+        "MAVLink 2; MAVROS between one program and the line",
+        serial("mavlink", "mavlink", "mavros"),
+        "mavlink",
+        12,
+    ),
+    "xrce": Peer(
+        "Micro XRCE-DDS; its agent between one program and the line",
+        serial("xrce", hop="agent"),
+        overhead=19,
+    ),
+    "line": Peer(
+        "sdrlinkd; a daemon between each program and the line",
+        lambda size: ours.line(BAUD, size),
+        overhead=ours.PDU_OVERHEAD,
+    ),
+    "direct": Peer(
+        "sdrlinkd without a line: one daemon, whose PDUs come straight back", ours.direct
+    ),
+    "ether": Peer("sdrlinkd without a line: two daemons on a simulated air", ours.ether),
 }
 
 

@@ -11,7 +11,7 @@ def open_transport(address: Address, side: str, size: int) -> Transport:
     """A way for messages from `side`, "companion" or "fcu"; payloads have `size` bytes."""
     if address.transport == "local":
         return Local(int(address.place))
-    if address.transport in ("direct", "ether"):
+    if address.transport in ("direct", "ether", "line"):
         # Imported here: its dependencies are missing in other environments.
         from benchmarks.peers.latency.ours import BusEnd
 

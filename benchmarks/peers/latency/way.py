@@ -1,5 +1,6 @@
 """Everything between two ends."""
 
+import json
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -17,6 +18,13 @@ class End(NamedTuple):
 def no_line() -> list[float]:
     """No delays: for ways without an emulated line."""
     return []
+
+
+def late_s(line: Process) -> list[float]:
+    """The delays that the process of an emulated line reports at its end."""
+    line.close_input()
+    late_s: list[float] = json.loads(line.line())
+    return late_s
 
 
 class Way(NamedTuple):
