@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -191,10 +192,31 @@ def test_a_second_of_laser_and_image(peer):
         rooms = [network.a.namespace, network.b.namespace]
     assert figures(laser).mdr_pct == 100
     assert np.all(laser.heard_at > laser.sent_at)
-    # The channel's own time for 64 KB; no machine can be faster.
+    # The channel's own times for 64 KB and for 1 KB; no machine can be faster.
     assert np.nanmin(image.heard_at - image.sent_at) > 0.08
+    assert np.nanmin(laser.heard_at - laser.sent_at) > 8 * 1024 / 6e6
     listed = subprocess.run(["ip", "netns", "list"], capture_output=True, text=True).stdout
     assert not [room for room in rooms if room in listed]
+
+
+@pytest.mark.slow
+@in_namespaces
+@pytest.mark.parametrize("peer", ["tcp_nodelay", "udp_nod"])
+def test_the_lasers_port_has_a_queue_of_its_own(peer):
+    """Counted by the queues themselves: 50 lasers go first, and the image waits behind them."""
+    flows = [Flow("laser", 1024, 0.02, 50, "latency"), Flow("image", 65536, 0.15, 6, "bulk")]
+    with namespaces.network(discipline="laser_first") as network:
+        laser, _ = run_peer(peer, flows, network, 1, drain_s=0.5)
+        room = network.a.namespace.removesuffix("a") + "air"
+        command = ["tc", "-n", room, "-s", "class", "show", "dev", "sky"]
+        told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    carried = {
+        found[1]: int(found[2])
+        for found in re.finditer(r"class htb (\S+) .*?\n Sent (\d+) bytes", told, re.DOTALL)
+    }
+    assert np.nanmin(laser.heard_at - laser.sent_at) > 8 * 1024 / 6e6
+    assert 50 * 1024 < carried["1:30"] < 80 * 1024
+    assert carried["1:10"] > 6 * 65536
 
 
 @in_namespaces
