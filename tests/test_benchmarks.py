@@ -122,6 +122,12 @@ ROWS = {
         "image_2n_stdD_ms",
         "mdr_2n_laser_pct",
         "mdr_2n_image_pct",
+        *(
+            f"{flow}_1ch{settings}_{each}"
+            for flow in ("laser", "image")
+            for settings in ("", "_defaults")
+            for each in ("D_ms", "stdD_ms", "Jd_ms", "mdr_pct")
+        ),
         "laser_3n_D_ms",
         "laser_3n_stdD_ms",
         "image_3n_D_ms",
@@ -130,6 +136,8 @@ ROWS = {
         "user_mbps_64KB_of_6.0",
         "recovery_after_5s_outage_s",
         "recovery_after_5s_outage_image_s",
+        "table5_2n_s",
+        "table5_3n_s",
         "rlc_rms_vs_local_mV",
         "urgent_p99_ms",
         "scheduler_cost_ratio_10_to_10000_queued",

@@ -20,7 +20,7 @@ from benchmarks.flows import Flow, Trace, figures
 from benchmarks.peers.pound import PEERS, namespaces, unavailable
 from benchmarks.peers.pound.control import local_loop, plant
 from benchmarks.peers.pound.job import Job, Loop, Topic
-from benchmarks.peers.pound.runs import Recovery, recovery, run_peer
+from benchmarks.peers.pound.runs import recovery, run_peer
 from benchmarks.peers.pound.sockets import Sockets
 from benchmarks.peers.pound.wire import (
     HEAD,
@@ -103,7 +103,7 @@ def test_joins_forget_what_never_becomes_whole():
 
 
 def test_a_job_comes_back_from_its_line():
-    loop = Loop(0.02, 5, [[1.0, 0.0], [0.0, 1.0]], [0.0, 1.0], 1.0, 1.0)
+    loop = Loop(0.001, 5, 20, [[1.0, 0.0], [0.0, 1.0]], [0.0, 1.0], 1.0, 1.0)
     topics = [Topic(0, "y", 60, "latency", "a"), Topic(1, "u", 60, "latency", "b")]
     job = Job("udp", "a", "10.0.0.1", "10.0.0.2", 6e6, topics, [(0.5, 0, 1)], 2.0, loop)
     for one in (job, replace(job, loop=None)):
@@ -172,10 +172,14 @@ def test_recovery_is_when_messages_begin_to_stay_fresh():
     backlog = (sent >= 7) & (sent < 8)
     heard[backlog] = 8.0
     heard[420] += 0.05
-    first_s, fresh_s = recovery(Trace(flow, sent, heard), 7.0)
-    assert (first_s, fresh_s) == (pytest.approx(1.0), pytest.approx(1.002))
+    found = recovery(Trace(flow, sent, heard), 7.0)
+    assert found == (pytest.approx(1.0), pytest.approx(1.002), pytest.approx(1.0))
+    old = np.where(backlog, np.nan, heard)
+    old[120] = 7.5  # What was sent before the outage says nothing of the link after it.
+    found = recovery(Trace(flow, sent, old), 7.0)
+    assert found == (pytest.approx(0.5), pytest.approx(1.002), pytest.approx(1.002))
     never = Trace(flow, sent, np.full(500, np.nan))
-    assert np.isnan(Recovery(*recovery(never, 7.0)).first_s)
+    assert np.all(np.isnan(recovery(never, 7.0)))
 
 
 def test_a_peer_that_is_not_there_has_a_reason():
