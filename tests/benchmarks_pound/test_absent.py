@@ -12,7 +12,7 @@ from benchmarks.flows import Flow
 from benchmarks.peers.pound import ends
 from benchmarks.peers.pound.namespaces import Network, Node
 from benchmarks.pound import __main__ as pound
-from benchmarks.pound import beside, limits, realtime, tables
+from benchmarks.pound import beside, limits, realtime
 from benchmarks.report import Row
 from tests.benchmarks_pound.test_peers import in_namespaces
 
@@ -113,7 +113,6 @@ def test_daemons_that_do_not_start_cost_their_own_rows_only(monkeypatch, capsys)
 def test_the_whole_benchmark_goes_on_without_a_peer(monkeypatch, capsys, broken_zenoh):
     monkeypatch.setattr(beside, "QUICK", ("zenoh_drop", "tcp_nodelay"))
     monkeypatch.setattr(beside, "LOOP_S", 0.5)
-    monkeypatch.setattr(tables, "LASERS", 250)
     monkeypatch.setattr(limits, "SIZES", (65536,))
     monkeypatch.setattr(realtime, "rows", lambda *_: [])
     code, told, err = run(monkeypatch, capsys, pound.measure)

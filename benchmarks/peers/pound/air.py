@@ -25,8 +25,8 @@ TAP_WITHOUT_HEADER = 0x0002 | 0x1000
 LARGEST = 1 << 16
 SPIN_S = 0.00015
 """Time before the end of a frame in which to poll instead of sleep, because timers are late."""
-NICE = -15
-"""Before the ends of the peers: the air must not wait for them."""
+PRIORITY = 1
+"""Of real time, so before all ordinary programs: the air waits for nobody."""
 
 
 class Line:
@@ -85,7 +85,7 @@ def carry(devices: list[int], rate_bps: float) -> None:
 def main() -> None:
     """Create the devices, and carry."""
     rate_bps, *names = sys.argv[1:]
-    os.nice(NICE)
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     devices = [open_tap(name) for name in names]
     print("ready", flush=True)
     carry(devices, float(rate_bps))
