@@ -107,12 +107,28 @@ TEXTS = {
     ),
     "flowgraphs": "GNU Radio's flowgraphs as the modem, at 1 Msps and 25 dB.",
     "pound": (
-        "16QAM 1/2 at 5 Msps, 6 Mbit/s, on the simulated air, in simulated time. In the same run, "
-        "what teams use instead, through two network namespaces and a token bucket of 6 Mbit/s. "
-        "The others have a channel of their own in each direction, and no turnaround. "
-        "`pound_like` imitates Pound's scheme, with priorities at each hop: it delivers the laser "
-        "sooner than ours does. Our image is later than that of most others because the laser goes "
-        "first. The rows `..._rt` are whole daemons in real time."
+        "16QAM 1/2 at 5 Msps, 6 Mbit/s. Ours are real links on an air of bursts, in virtual "
+        "time, with clocks and repeats as in a daemon. In the same run, what teams use "
+        "instead: programs in network namespaces, in real time, on an air of 6 Mbit/s, "
+        "where a packet arrives when its airtime is over.\n\n"
+        "*Which air.* In `..._2n_...`, `user_mbps_...` and `recovery_...`, each direction has "
+        "an air of its own and there is no turnaround, for ours and for the others. In "
+        "`..._1ch_...`, `..._3n_...`, `table5_...` and `rlc_...`, all robots share one "
+        "half-duplex air. There, ours wait for an access policy, preambles and a turnaround "
+        "of 0.1 ms. The packets of the others take turns, without any of these. Pound's "
+        "figures in the column *paper* are from Wi-Fi, which is one half-duplex air. So only "
+        "these rows compare with them.\n\n"
+        "`..._1ch_...`: bursts of 20 ms, blocks of 0.2 ms, and PDUs that hold a laser "
+        "message. `..._1ch_defaults_...`: a daemon's defaults, apart from sample rate and "
+        "MCS. The value is that of the policy that `auto` selects: minislot in the former, "
+        "tdma in the latter. *laser_first*: `tc` with two HTB classes, that of the laser's "
+        "port first. *fq_codel*: behind that queue of Linux. `table5_...`: the sender or the "
+        "relay is off for 5 s. In the paper, Wi-Fi cards rejoin their network in this time; "
+        'here, nothing does. Ours learn their routes (`relay.policy = "auto"`); those of the '
+        "others are fixed. `rlc_...`: 1 mV is a millisecond of delay.\n\n"
+        "`pound_like` imitates Pound's scheme, with priorities at each hop. Our image is "
+        "later than that of most others because the laser goes first. The rows `..._rt` are "
+        "whole daemons in real time."
     ),
     "timesync": (
         "The same time stamps through clock filters: five exchanges a second, a tenth lost each"

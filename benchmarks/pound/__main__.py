@@ -9,8 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.absent import attempt
-from benchmarks.pound import beside, limits, pictures, realtime, rows, tables
+from benchmarks.pound import beside, channel_rows, limits, pictures, realtime, rows, tables
 from benchmarks.report import Drawing, Row, exactly, main
 
 PHASES, QUICK_PHASES = 10, 2
@@ -32,18 +31,25 @@ def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row | Dr
     sizes = (limits.SIZES[-1],) if quick else limits.SIZES
     one_hop = beside.tables(peers, flows[0], False, seed)
     two_hops = beside.tables(peers, flows[1], True, seed)
+    one_channel = beside.one_channel(peers, flows[0], seed)
     mbps = beside.bandwidths(peers, sizes, 2.0 if quick else 4.0)
     loops = beside.loops(peers, phases)
+    cut = [] if quick else peers
+    table_5 = {
+        2: beside.recoveries(cut, shared=True),
+        3: beside.recoveries(cut, relay=True),
+    }
     yield from exactly(rows.two_nodes(seed, quick, one_hop))
+    yield from exactly(channel_rows.two_nodes(seed, quick, one_channel))
     yield from exactly(rows.three_nodes(seed, quick, two_hops))
     yield from exactly(rows.bandwidth(seed, quick, mbps))
-    yield from exactly(rows.outage(seed, quick, {} if quick else beside.recoveries(peers)))
+    yield from exactly(rows.outage(seed, quick, beside.recoveries(cut)))
+    yield from exactly(channel_rows.outage(seed, quick, table_5))
     yield from exactly(rows.control_loop(seed, phases, loops))
     yield from exactly(rows.urgent(seed, quick))
     yield from rows.costs(seed, quick)
     yield from exactly(rows.plan(seed, quick))
-    with attempt("daemons in real time"):
-        yield from realtime.rows(seed, quick)
+    yield from realtime.rows(seed, quick)
     if not (quick or no_peers):
         yield pictures.drawing(seed, one_hop, mbps, loops, phases[len(phases) // 2])
 

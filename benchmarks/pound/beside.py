@@ -1,4 +1,4 @@
-"""What a team would use instead, in the same run: two namespaces and a token bucket of 6 Mbit/s."""
+"""What a team would use instead, in the same run: two namespaces on an air of 6 Mbit/s."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -11,14 +11,17 @@ from rich.progress import Progress
 from benchmarks.absent import attempt, tell
 from benchmarks.flows import Figures, Flow
 from benchmarks.peers.pound import PEERS, unavailable
-from benchmarks.peers.pound.control import control_loop, local_loop
-from benchmarks.peers.pound.namespaces import available, network
-from benchmarks.peers.pound.runs import outage, run_peer, saturate
+from benchmarks.peers.pound.control import control_loop, rms_mv
+from benchmarks.peers.pound.namespaces import Discipline, available, network
+from benchmarks.peers.pound.runs import Recovery, outage, run_peer, saturate
 from benchmarks.pound.tables import by_flow
 
 QUICK = ("tcp_nodelay", "udp", "pound_like")
 FIFO = ("tcp_nagle", "tcp_nodelay", "udp", "udp_nod", "nimbro_udp", "nimbro_udp_tcp")
 """Peers without priorities."""
+QUEUED = ("tcp_nodelay", "udp_nod")
+"""Peers that also run behind a queue discipline."""
+DISCIPLINES: tuple[Discipline, ...] = ("laser_first", "fq_codel")
 LOOP_S = 3.0
 
 T = TypeVar("T")
@@ -50,6 +53,22 @@ def tables(
     return _each(peers, f"{'two hops' if relay else 'one hop'}", one)
 
 
+def one_channel(
+    peers: Sequence[str], flows: Sequence[Flow], seed: int
+) -> dict[str, dict[str, Figures]]:
+    """Tables I and II on one channel for both directions; QUEUED also behind each discipline."""
+    ways: dict[str, tuple[str, Discipline]] = {name: (name, "fifo") for name in peers}
+    ways |= {f"{name}_{way}": (name, way)
+             for name in QUEUED if name in peers for way in DISCIPLINES}  # fmt: skip
+
+    def one(name: str) -> dict[str, Figures]:
+        peer, discipline = ways[name]
+        with network(shared=True, discipline=discipline) as on:
+            return by_flow(run_peer(peer, list(flows), on, seed))
+
+    return _each([*ways], "one channel", one)
+
+
 def bandwidths(
     peers: Sequence[str], sizes: Sequence[int], seconds: float
 ) -> dict[str, dict[int, float]]:
@@ -66,23 +85,23 @@ def bandwidths(
     return _each(peers, "bandwidth", one)
 
 
-def recoveries(peers: Sequence[str]) -> dict[str, float]:
-    """Table V: recovery time in s by peer, the later of two flows."""
+def recoveries(
+    peers: Sequence[str], *, shared: bool = False, relay: bool = False
+) -> dict[str, Recovery]:
+    """Table V: recovery by peer, the later of two flows."""
 
-    def one(name: str) -> float:
-        with network() as on:
-            return max(each.fresh_s for each in outage(name, on))
+    def one(name: str) -> Recovery:
+        with network(shared=shared, relay=relay) as on:
+            return Recovery(*map(float, np.max(outage(name, on), axis=0)))
 
-    return _each(peers, "outage", one)
+    return _each(peers, f"outage{', one channel' * shared}{', two hops' * relay}", one)
 
 
 def loops(peers: Sequence[str], phases: Sequence[float]) -> dict[str, float]:
     """Fig. 21: mean RMS difference to the local run in mV, by peer."""
-    local = local_loop(round(LOOP_S / 0.02))
 
     def one(name: str) -> float:
-        runs = [control_loop(name, phase, LOOP_S) for phase in phases]
-        return float(np.mean([1e3 * np.sqrt(np.mean((run - local) ** 2)) for run in runs]))
+        return float(np.mean([rms_mv(control_loop(name, phase, LOOP_S)) for phase in phases]))
 
     return _each(peers, "control loop", one)
 

@@ -63,7 +63,7 @@ def _after_outage(names: list[str], rng: np.random.Generator, seed: int) -> dict
         sent.append(
             Sent(Flow(name, size, period_s, int(seconds / period_s), qos, 0, 0, phase_s), 1, 2)
         )
-    experiment = prepare(sent, Air(), seed, _latest_wins)
+    experiment = prepare(sent, Air(), seed, latest_wins)
     simulation = experiment.simulation
     simulation.call(begin, lambda: simulation.silence(1, end))
     return {
@@ -74,7 +74,7 @@ def _after_outage(names: list[str], rng: np.random.Generator, seed: int) -> dict
     }
 
 
-def _latest_wins(flow: Flow) -> TopicPolicy:
+def latest_wins(flow: Flow) -> TopicPolicy:
     return TopicPolicy(qos=flow.qos, depth=1)  # type: ignore[arg-type]
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from backends import AirParams, LinkOverride, RadioParams, World
+from backends import AirParams, LinkOverride, Outage, RadioParams, World
 from benchmarks.flows import Flow, Times, Trace
 from benchmarks.worlds.arrivals import Arrival
 from benchmarks.worlds.bursts import Simulation
@@ -16,12 +16,14 @@ from sdrlinkd.link import (
     AccessParams,
     BulkParams,
     ClassesParams,
+    ClockParams,
     Delivered,
     Link,
     LinkParams,
     QueueParams,
     ReassemblyParams,
     RelayParams,
+    RepeatParams,
     TopicPolicy,
 )
 from sdrlinkd.modem import Airtimes
@@ -54,6 +56,8 @@ class Air(NamedTuple):
 
     nodes: int = 2
     policy: str = "none"
+    full_duplex: bool = True
+    """Whether each direction has an air of its own; otherwise both share one."""
     turnaround_s: float = 0.0
     overrides: Sequence[LinkOverride] = ()
     max_burst_s: float = MAX_BURST_S
@@ -62,6 +66,10 @@ class Air(NamedTuple):
     pdu_size: int = PDU_SIZE
     routes: Mapping[int, Sequence[str]] = {}
     """The topics that each relay forwards."""
+    learns_routes: bool = False
+    """Whether the robots learn them instead."""
+    off: Mapping[int, Sequence[Outage]] = {}
+    """When the radios of some robots are off."""
 
 
 class Run(NamedTuple):
@@ -147,14 +155,15 @@ def simulate(
 ) -> Simulation:
     """Robots with links of their own; `clocks_ppm` lists them."""
     params = AirParams(rate_hz=RATE_HZ, block_s=air.block_s, snr_db=SNR_DB)
-    radio = RadioParams(full_duplex=air.policy == "none", turnaround_s=air.turnaround_s)
+    radio = RadioParams(full_duplex=air.full_duplex, turnaround_s=air.turnaround_s)
     links = {}
     for node in clocks_ppm:
-        relay = RelayParams()
+        relay = RelayParams(policy="auto") if air.learns_routes else RelayParams()
         if node in air.routes:
             relay = RelayParams(policy="routes", routes=list(air.routes[node]))
+        hop_limit = air.nodes if air.learns_routes else 1 + len(air.routes)
         links[node] = Link(
-            LinkParams(pdu_size=air.pdu_size, hop_limit=1 + len(air.routes)),
+            LinkParams(pdu_size=air.pdu_size, hop_limit=hop_limit),
             QueueParams(),
             ReassemblyParams(),
             registry,
@@ -162,12 +171,14 @@ def simulate(
             Random(100 * seed + node),
             classes=air.classes,
             relay=relay,
+            clock=ClockParams(),
+            repeat=RepeatParams(),
         )
         links[node].set_policies(policies)
     modem = modem_on(air)
     return Simulation(
         params,
-        World(params, {}, list(air.overrides)),
+        World(params, {}, list(air.overrides), off=air.off),
         {node: msgspec.structs.replace(radio, clock_ppm=ppm) for node, ppm in clocks_ppm.items()},
         links,
         modem,

@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.flows import Figures
 from benchmarks.kept import FIGURES
-from benchmarks.peers.pound.control import local_loop
+from benchmarks.peers.pound.control import EVERY, PERIOD_S, TICK_S, undelayed
 from benchmarks.pound import limits, loop, tables
 from benchmarks.pound.beside import LOOP_S
 from benchmarks.report import Drawing
@@ -26,7 +26,7 @@ def drawing(
 ) -> Drawing:
     """What the figures show, ours beside the others."""
     ours = tables.by_flow(tables.two_nodes(seed, quick=False).traces)
-    ticks = round(LOOP_S / 0.02)
+    ticks = round(LOOP_S / TICK_S)
     return Drawing("beside", {
         "delays": {
             name: {flow: of[flow]._asdict() for flow in FLOWS}
@@ -37,7 +37,8 @@ def drawing(
         },
         "loops_mv": dict(loops),
         "loop_v": {
-            "local": local_loop(ticks), "sdrlinkd": loop.run_loop(phase_s, seed, ticks),
+            "local": undelayed(ticks)[::EVERY],
+            "sdrlinkd": loop.run_loop(phase_s, seed, ticks)[::EVERY],
         },
     })  # fmt: skip
 
@@ -85,7 +86,7 @@ def _bandwidth_and_loop(shows: Mapping[str, Any]) -> None:
     )
     bandwidth.xaxis.set_major_formatter("{x:g}")
     legend_beside(bandwidth)
-    at = 0.02 * np.arange(len(shows["loop_v"]["local"]))
+    at = PERIOD_S * np.arange(len(shows["loop_v"]["local"]))
     voltage.plot(at, shows["loop_v"]["local"], color=COLORS[1], lw=4, alpha=0.6, label="local")
     voltage.plot(at, shows["loop_v"]["sdrlinkd"], color=OURS, lw=1, label="through sdrlinkd")
     voltage.set(xlabel="time in s", ylabel="voltage in V")

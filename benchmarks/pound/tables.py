@@ -15,6 +15,8 @@ IMAGE_3N_S = 0.3
 KB = 1024
 IMAGE = 65536
 BLOCK_3N_S = 5e-5
+TURNAROUND_S = 1e-4
+"""Of half-duplex radios."""
 FAR_DB = 4.0
 """SNR over two hops at once: the signal is sensed but not decoded."""
 
@@ -63,8 +65,8 @@ def chain(n_nodes: int) -> Air:
     ]
     routes = {node: [f"1>{n_nodes}", f"{n_nodes}>1"] for node in ids if 1 < node < n_nodes}
     return Air(
-        nodes=n_nodes, policy="minislot", turnaround_s=1e-4, overrides=far, routes=routes,
-        block_s=BLOCK_3N_S,
+        nodes=n_nodes, policy="minislot", full_duplex=False, turnaround_s=TURNAROUND_S,
+        overrides=far, routes=routes, block_s=BLOCK_3N_S,
     )  # fmt: skip
 
 
@@ -93,7 +95,9 @@ def opposing(seed: int, quick: bool) -> Run:
         laser._replace(name="laser_back", phase_s=laser.phase_s / 2),
         slow._replace(name="image_back"),
     )
-    air = Air(policy="minislot", turnaround_s=1e-4, block_s=BLOCK_3N_S)
+    air = Air(
+        policy="minislot", full_duplex=False, turnaround_s=TURNAROUND_S, block_s=BLOCK_3N_S
+    )  # fmt: skip
     sent = [Sent(laser, 1, 2), Sent(slow, 1, 2), *(Sent(flow, 2, 1) for flow in back)]
     return run(sent, air, seed)
 

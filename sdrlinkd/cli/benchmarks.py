@@ -46,7 +46,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "flowgraphs": Benchmark("GNU Radio's flowgraphs as a modem.", 10, needs=("gnuradio",)),
     "pound": Benchmark(
-        "Section VI of the Pound paper, next to common alternatives.", 30,
+        "Section VI of the Pound paper, next to common alternatives.", 60,
         peers=("iproute2", "eclipse-zenoh", "ros-jazzy-rclpy"),
     ),
     "timesync": Benchmark("Clock filters on the same time stamps.", 4),

@@ -12,6 +12,7 @@ import signal
 import struct
 import sys
 import time
+from collections import deque
 
 from benchmarks.peers.pound.job import CONTACT_S, Job, Loop, NoContactError, Transport
 from benchmarks.peers.pound.sockets import Sockets
@@ -56,7 +57,7 @@ class Player:
 
 
 class Plant(Player):
-    """Sends its output once per period, and steps with the input received by then."""
+    """Sends its output once per period; steps at each tick with the input received by then."""
 
     def __init__(self, job: Job, loop: Loop) -> None:
         super().__init__(job)
@@ -73,11 +74,18 @@ class Plant(Player):
         (a00, a01), (a10, a11) = self._loop.a
         b0, b1 = self._loop.b
         x0 = x1 = 0.0
+        sends = deque(self._job.sends)
         for tick in range(self._loop.ticks):
-            transport.run(self.start + tick * self._loop.period_s)
-            u = self._u
+            at = self.start + tick * self._loop.tick_s
+            while sends and self.start + sends[0][0] <= at:
+                after, *rest = sends.popleft()
+                transport.run(self.start + after)
+                self.send(transport, *rest)
+            transport.run(at)
             self.values.append(x0)
-            self.send(transport, Y, tick, x0)
+            if tick % self._loop.every == 0:
+                self.send(transport, Y, tick // self._loop.every, x0)
+            u = self._u
             x0, x1 = a00 * x0 + a01 * x1 + b0 * u, a10 * x0 + a11 * x1 + b1 * u
 
 

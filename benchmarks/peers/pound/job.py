@@ -32,10 +32,12 @@ class Topic(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """The control loop: x(k+1) = A x(k) + b u(k), y(k) = x0(k); u = gain (setpoint - y)."""
+    """The control loop: x(k+1) = A x(k) + b u(k), y = x0; u = gain (setpoint - y)."""
 
-    period_s: float
+    tick_s: float
     ticks: int
+    every: int
+    """Number of ticks from one y to the next."""
     a: list[list[float]]
     b: list[float]
     gain: float

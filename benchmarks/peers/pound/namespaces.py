@@ -1,13 +1,15 @@
 """Two or three nodes on one slow channel, as network namespaces of this machine.
 
-    A ─veth─ B                 shared=False: each direction has a token bucket of its own
+    A ─air─ B                  shared=False: each direction has an air of its own
     A ─┐   ┌─ B
-       ├─air                   shared=True: one bucket for all traffic
-    A ─┴─ R ─┴─ B              relay=True: R forwards, and both hops use that bucket
+       ├─air                   shared=True: one air for all traffic
+    A ─┴─ R ─┴─ B              relay=True: R forwards, and both hops use that air
 
-On the shared channel each node has its own queue, and the queues take turns packet by packet, like
-stations on Wi-Fi: A, R and B are macvlans in "vepa" mode on one veth, whose other end reflects.
-Queued packets still count against the sender's socket buffer, as in a driver's queue.
+A token bucket lets frames out at the channel's rate, at most one ahead of the one in the air. The
+air is a process (see `air`): a frame is received when its airtime is over. On the shared channel
+each node has its own queue, and the queues take turns frame by frame, like stations on Wi-Fi: A, R
+and B are macvlans in "vepa" mode on one device, which receives again what it sends. Queued frames
+still count against the sender's socket buffer, as in a driver's queue.
 """
 
 import contextlib
@@ -21,14 +23,22 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from benchmarks.absent import PeerError
+from benchmarks.environments import variables
+from sdrlinkd.process import Process, ProcessError, module
 
 DEVICE = "air"
 NET = "10.77.0"
-BURST = 4600
-"""Bytes of three frames, so that a late timer costs no throughput."""
+BURST = 1600
+"""Bytes of one frame, so that a late timer costs no throughput."""
+AIR = "benchmarks.peers.pound.air"
+START_S = 10.0
+Discipline = Literal["fifo", "laser_first", "fq_codel"]
+"""How a node's packets queue: by arrival, those of the laser's port first, or as in Linux."""
+LASER_PORTS = (("sport", 45000), ("dport", 46000))
+"""Ports of topic 0, from the sender: of TCP and of UDP."""
 TCP = ("congctl", "cubic")
 """Linux's default congestion control, whatever this machine's setting is."""
 
@@ -87,42 +97,54 @@ def available() -> str | None:
     try:
         _sweep()
         for shared in (False, True):
-            with _network(6e6, shared, shared, 0.5):
+            with _network(6e6, shared, shared, 0.5, "fifo"):
                 pass
-    except NetworkError as error:
+    except (NetworkError, OSError) as error:
         return str(error)
     return None
 
 
 @contextlib.contextmanager
 def network(
-    rate_bps: float = 6e6, *, shared: bool = False, relay: bool = False, queue_s: float = 0.5
+    rate_bps: float = 6e6,
+    *,
+    shared: bool = False,
+    relay: bool = False,
+    queue_s: float = 0.5,
+    discipline: Discipline = "fifo",
 ) -> Iterator[Network]:
-    """A network for the duration of the `with`; `relay` implies `shared`.
+    """A network for the duration of the `with`; `relay` implies `shared`, as a discipline does.
 
-    A node's queue holds what the channel carries in `queue_s`.
+    A node's queue holds what the channel carries in `queue_s`. Raises NetworkError.
     """
     if (reason := available()) is not None:
         raise NetworkError(reason)
-    with _network(rate_bps, shared or relay, relay, queue_s) as it:
+    shared = shared or relay or discipline != "fifo"
+    with _network(rate_bps, shared, relay, queue_s, discipline) as it:
         yield it
 
 
 @contextlib.contextmanager
-def _network(rate_bps: float, shared: bool, relay: bool, queue_s: float) -> Iterator[Network]:
+def _network(
+    rate_bps: float, shared: bool, relay: bool, queue_s: float, discipline: Discipline
+) -> Iterator[Network]:
     name = f"pound{os.getpid()}n{next(_COUNT)}"
     a, r, b = (Node(f"{name}{letter}", f"{NET}.{i}") for i, letter in enumerate("arb", 1))
     nodes = [a, r, b] if relay else [a, b]
     air = f"{name}air"
-    rooms = [node.namespace for node in nodes] + [air] * shared
+    rooms = [node.namespace for node in nodes] + [air]
+    stack = contextlib.ExitStack()
     try:
         for room in rooms:
             _run("ip", "netns", "add", room)
             _settle(room, forward=relay and room == r.namespace)
+        devices = ["sky"] if shared else ["sky", "sky2"]
+        stack.enter_context(_air(air, rate_bps, devices))
         if shared:
-            _share(air, nodes, rate_bps, queue_s)
+            _share(air, nodes, rate_bps, queue_s, discipline)
         else:
-            _join(a, b, rate_bps, queue_s)
+            for node, device in zip(nodes, devices, strict=True):
+                _own(air, device, node, rate_bps, queue_s)
         for node in nodes:
             _run("ip", "-n", node.namespace, "addr", "add", f"{node.address}/24", "dev", DEVICE)
             _run("ip", "-n", node.namespace, "link", "set", DEVICE, "up")
@@ -134,6 +156,7 @@ def _network(rate_bps: float, shared: bool, relay: bool, queue_s: float) -> Iter
                 _run("ip", "-n", here.namespace, *way)
         yield Network(a, b, r if relay else None, rate_bps, shared)
     finally:
+        stack.close()
         for room in rooms:
             subprocess.run(["ip", "netns", "del", room], check=False, capture_output=True)
 
@@ -162,25 +185,39 @@ def _settle(room: str, forward: bool) -> None:
     _run("ip", "-n", room, "link", "set", "lo", "up")
 
 
-def _join(a: Node, b: Node, rate_bps: float, queue_s: float) -> None:
-    ends = [DEVICE, "netns", a.namespace], [DEVICE, "netns", b.namespace]
-    _run("ip", "link", "add", *ends[0], "type", "veth", "peer", "name", *ends[1])
-    for node in (a, b):
-        _run("ip", "-n", node.namespace, "link", "set", DEVICE, "gso_max_segs", "1")
-        shape = ["tbf", "rate", f"{rate_bps:.0f}bit", "burst", str(BURST)]
-        shape += ["latency", f"{1e3 * queue_s:.0f}ms"]
-        _run("tc", "-n", node.namespace, "qdisc", "add", "dev", DEVICE, "root", *shape)
+@contextlib.contextmanager
+def _air(room: str, rate_bps: float, devices: list[str]) -> Iterator[None]:
+    """Run the air's process, which has these devices."""
+    command = ["ip", "netns", "exec", room, *module(AIR, f"{rate_bps:.0f}", *devices)]
+    process = Process(command, name="the air", environment=variables(), session=False)
+    try:
+        process.start()
+        process.line(START_S)
+    except ProcessError as error:
+        process.kill()
+        raise NetworkError(str(error)) from None
+    try:
+        yield
+    finally:
+        process.kill()
 
 
-def _share(air: str, nodes: list[Node], rate_bps: float, queue_s: float) -> None:
+def _own(air: str, device: str, node: Node, rate_bps: float, queue_s: float) -> None:
+    """Give a node a device of its own, behind a token bucket."""
+    _run("ip", "-n", air, "link", "set", device, "gso_max_segs", "1")
+    _run("ip", "-n", air, "link", "set", device, "netns", node.namespace, "name", DEVICE)
+    shape = ["tbf", "rate", f"{rate_bps:.0f}bit", "burst", str(BURST)]
+    shape += ["latency", f"{1e3 * queue_s:.0f}ms"]
+    _run("tc", "-n", node.namespace, "qdisc", "add", "dev", DEVICE, "root", *shape)
+
+
+def _share(
+    air: str, nodes: list[Node], rate_bps: float, queue_s: float, discipline: Discipline
+) -> None:
+    """Make each node a station on one device, with a queue of its own."""
     ip, tc = ("ip", "-n", air), ("tc", "-n", air)
-    _run(*ip, "link", "add", "sky", "type", "veth", "peer", "name", "mirror")
-    _run(*ip, "link", "add", "bridge", "type", "bridge")
-    _run(*ip, "link", "set", "mirror", "master", "bridge")
-    _run(*ip, "link", "set", "mirror", "type", "bridge_slave", "hairpin", "on")
     _run(*ip, "link", "set", "sky", "gso_max_segs", "1")
-    for device in ("sky", "mirror", "bridge"):
-        _run(*ip, "link", "set", device, "up")
+    _run(*ip, "link", "set", "sky", "up")
     whole = [f"{rate_bps:.0f}bit", "burst", str(BURST), "cburst", str(BURST)]
     # Almost no guaranteed rate: all of it is borrowed from the one bucket, in turns.
     turn = ["htb", "rate", "8kbit", "ceil", *whole, "quantum", "1514"]
@@ -188,20 +225,29 @@ def _share(air: str, nodes: list[Node], rate_bps: float, queue_s: float) -> None
     under = [*tc, "class", "add", "dev", "sky", "parent"]
     _run(*under, "1:", "classid", "1:1", "htb", "rate", *whole)
     _run(*under, "1:1", "classid", "1:99", *turn)
-    limit = str(int(rate_bps * queue_s / 8))
+    fifo = ["bfifo", "limit", str(int(rate_bps * queue_s / 8))]
     for i, node in enumerate(nodes, 10):
-        of = f"1:{i}"
-        _run(*under, "1:1", "classid", of, *turn)
-        _run(*tc, "qdisc", "add", "dev", "sky", "parent", of, "bfifo", "limit", limit)
         _run(*ip, "link", "add", f"m{i}", "link", "sky", "type", "macvlan", "mode", "vepa")
         _run(*ip, "link", "set", f"m{i}", "gso_max_segs", "1")
         _run(*ip, "link", "set", f"m{i}", "netns", node.namespace, "name", DEVICE)
         # By the sending station, not by the address in the packet: R sends packets that A made.
         mac = _run("ip", "-n", node.namespace, "-br", "link", "show", DEVICE).split()[2]
         digits = mac.replace(":", "")
-        match = f"match u32 0x{digits[:8]} 0xffffffff at -8 match u16 0x{digits[8:]} 0xffff at -4"
-        into = ["parent", "1:", "protocol", "all", "u32", *match.split(), "flowid", of]
-        _run(*tc, "filter", "add", "dev", "sky", *into)
+        station = f"match u32 0x{digits[:8]} 0xffffffff at -8 match u16 0x{digits[8:]} 0xffff at -4"
+        rank = ["prio", "1"] if discipline == "laser_first" else []
+        of = f"1:{i}"
+        _run(*under, "1:1", "classid", of, *turn, *rank)
+        leaf = ["fq_codel"] if discipline == "fq_codel" else fifo
+        _run(*tc, "qdisc", "add", "dev", "sky", "parent", of, *leaf)
+        filters = [*tc, "filter", "add", "dev", "sky", "parent", "1:", "prio"]
+        if discipline == "laser_first":
+            first = f"1:{i + 20}"
+            _run(*under, "1:1", "classid", first, *turn, "prio", "0")
+            _run(*tc, "qdisc", "add", "dev", "sky", "parent", first, *fifo)
+            for side, port in LASER_PORTS:
+                match = [*station.split(), "match", "ip", side, str(port), "0xffff"]
+                _run(*filters, "1", "protocol", "ip", "u32", *match, "flowid", first)
+        _run(*filters, "2", "protocol", "all", "u32", *station.split(), "flowid", of)
 
 
 def _run(*words: str) -> str:

@@ -25,6 +25,8 @@ class Recovery(NamedTuple):
     """Time until its first message, however old."""
     fresh_s: float
     """Time until the first message younger than 10 ms from which on they stay as young."""
+    new_s: float
+    """Time until the first message that was sent since."""
 
 
 def run_peer(
@@ -114,7 +116,7 @@ def recovery(trace: Trace, up_s: float) -> Recovery:
     order = np.argsort(trace.heard_at)
     order = order[trace.heard_at[order] > up_s]
     if not len(order):
-        return Recovery(float("nan"), float("nan"))
+        return Recovery(float("nan"), float("nan"), float("nan"))
     arrived_s = trace.heard_at[order] - up_s
     late = trace.heard_at[order] - trace.sent_at[order] >= FRESH_S
     fresh_s = (
@@ -122,4 +124,9 @@ def recovery(trace: Trace, up_s: float) -> Recovery:
         for i in np.flatnonzero(~late)
         if np.sum(late[i : i + STAYS]) <= HICCUPS and len(late) - i >= STAYS
     )
-    return Recovery(float(arrived_s[0]), float(next(fresh_s, np.nan)))
+    new_s = arrived_s[trace.sent_at[order] > up_s]
+    return Recovery(
+        float(arrived_s[0]),
+        float(next(fresh_s, np.nan)),
+        float(new_s[0]) if len(new_s) else float("nan"),
+    )
