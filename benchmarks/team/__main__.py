@@ -7,6 +7,7 @@ from statistics import median
 from benchmarks.report import Row, exactly, main
 from benchmarks.team import crowd_rows, rtwmp_rows
 from benchmarks.team.chain import Carried, carry
+from benchmarks.team.driving import AFTER_S, BEFORE_S, HEARD_DB, SIDE_M, drive
 from benchmarks.team.healing import PERIOD_S, heal
 from benchmarks.team.turnaround import wait_for_turns
 
@@ -15,6 +16,7 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
     """Measure all rows; `quick` takes a tenth of the trials."""
     yield from exactly(_chain(seed, quick))
     yield from exactly(_chain5(seed, quick))
+    yield from exactly(_driving(seed, quick))
     yield from exactly(_turnaround(seed, quick))
     yield from exactly(crowd_rows.rows(seed, quick))
     n = 2 if quick else 20
@@ -76,6 +78,21 @@ def _chain5(seed: int, quick: bool) -> Iterator[Row]:
                 "the same flows over four hops, each half as often; they begin after 8 s, when "
                 "the team has found its routes; policy grant; asked: PDUs of which a robot asked "
                 "another one, of those forwarded"
+            ),
+        )  # fmt: skip
+
+
+def _driving(seed: int, quick: bool) -> Iterator[Row]:
+    ours = drive("grant", seed, 20.0 if quick else 600.0)
+    for qos, target in (("urgent", 0.9999), ("latency", 0.999), ("default", 0.99)):
+        yield Row(
+            f"mobile_8_mdr_{qos}", ours.mdr(qos), "ratio", target, "more", ours.sent[qos],
+            peers={"hops": ours.hops, "without_path": ours.without_path[qos]},
+            note=(
+                f"seven robots drive in a square of {SIDE_M:g} m, a base stands at its edge: "
+                "odometry and status to the base, commands from it; messages count if there was a "
+                f"path of links of {HEARD_DB:g} dB or more from {BEFORE_S:g} s before them to "
+                f"{AFTER_S:g} s after; policy grant"
             ),
         )  # fmt: skip
 

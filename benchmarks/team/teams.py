@@ -1,12 +1,12 @@
 """Robots with real links on an air of bursts: who hears whom, what they send, what arrives."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations
 from random import Random
 from typing import Literal, NamedTuple
 
-from backends import AirParams, LinkOverride, RadioParams, World
+from backends import AirParams, LinkOverride, RadioParams, Track, World
 from benchmarks.worlds.arrivals import Arrival
 from benchmarks.worlds.bursts import Simulation
 from sdrlinkd.config import ModemParams
@@ -38,6 +38,9 @@ TOPIC_TYPE = "std_msgs/msg/UInt8MultiArray"
 
 
 Policy = Literal["csma", "minislot", "tdma", "grant", "auction"]
+
+
+NO_TRACKS: Mapping[int, Track] = {}
 
 
 class Flow(NamedTuple):
@@ -87,12 +90,17 @@ class Heard:
 
 
 class Team:
-    """Robots `ids`, of which the pairs in `links` hear each other both ways."""
+    """Robots `ids`, of which the pairs in `links` hear each other both ways.
+
+    Without `links`, their `tracks` through `air` tell how well. An SNR is kept for `keep_s`.
+    """
 
     def __init__(
-        self, ids: Iterable[int], links: Collection[tuple[int, int]], flows: Sequence[Flow],
-        seed: int, policy: Policy = "tdma", pdu_size: int = PDU_SIZE,
+        self, ids: Iterable[int], links: Collection[tuple[int, int]] | None,
+        flows: Sequence[Flow], seed: int, policy: Policy = "tdma", pdu_size: int = PDU_SIZE,
         turnaround_s: float = TURNAROUND_S, snr_db: float = GOOD_DB, modem: ModemParams = MODEM,
+        air: AirParams | None = None, tracks: Mapping[int, Track] = NO_TRACKS,
+        keep_s: float = 0.0,
     ) -> None:  # fmt: skip
         self._pdu_size = pdu_size
         self._topics = [*dict.fromkeys(flow.name for flow in flows)]
@@ -104,11 +112,11 @@ class Team:
         self._by_topic = {
             (self._topics.index(heard.flow.name), heard.flow.src): heard for heard in self.heard
         }
-        air = AirParams(rate_hz=RATE_HZ, block_s=modem.block_s, snr_db=snr_db)
+        air = air or AirParams(rate_hz=RATE_HZ, block_s=modem.block_s, snr_db=snr_db)
         deaf = [
             LinkOverride(sender=a, receiver=b, snr_db=NONE_DB)
             for a, b in permutations(self.ids, 2)
-            if (a, b) not in links and (b, a) not in links
+            if links is not None and (a, b) not in links and (b, a) not in links
         ]
         registry = make_registry([(name, TOPIC_TYPE) for name in self._topics])
         radios = {
@@ -120,7 +128,7 @@ class Team:
         }  # fmt: skip
         self.simulation = Simulation(
             air,
-            World(air, {}, deaf),
+            World(air, dict(tracks), deaf),
             radios,
             {node: self._link(node, registry, seed) for node in self.ids},
             modem,
@@ -128,6 +136,7 @@ class Team:
             AccessParams(policy=policy, nodes=self.ids, force=True),
             {node: self._arrivals(node) for node in self.ids},
             seed=seed,
+            keep_s=keep_s,
             listen=self._listen,
         )
 

@@ -186,13 +186,13 @@ def test_when_the_root_dies_another_plans_within_three_rounds(loss):
         assert {each.src for each in team.bursts if each.begin > died_s + 0.5} == {2, 3, 4, 5}
 
 
-def test_robots_join_and_the_lowest_takes_over_without_a_clash():
+def test_robots_join_without_a_clash_and_the_root_stays():
     for seed in range(4):
         team = saturated(4, seed, joins={1: 4.0, 3: 5.0})
         team.run(3.9)
         assert team.roots() == {2}
         team.run(9.0)
-        assert team.roots() == {1}
+        assert team.roots() == {2}
         assert {each.src for each in team.bursts if each.begin > 8} == {1, 2, 3, 4}
         # Two robots that are not here yet may use the same turn for anybody.
         assert len(team.clashes(4.0)) <= 3

@@ -1,9 +1,9 @@
 """Who plans the turns of the team: the root, and how it is found, followed, replaced and lost.
 
-The best root is the robot with the fewest hops to the farthest one, of these the lowest. Everybody
-follows the best root it has heard of. A robot that would be a better one takes over in its own
-turn. A root that is silent for some rounds is lost. Then the others wait, each a turn longer than
-the one before it, until one of them plans.
+The best root is the robot from which a PDU reaches all others with the fewest tries, of these the
+lowest. Everybody follows the best root it has heard of. A robot that reaches all with fewer takes
+over in its own turn. A root that is silent for some rounds is lost. Then the others wait, each a
+turn longer than the one before it, until one of them plans.
 """
 
 from math import inf
@@ -16,7 +16,7 @@ from sdrlinkd.wire import FAR, Frame
 
 LISTEN_S = 1.0
 """A robot plans rounds of its own after hearing no plan for this time in s, and some rounds."""
-BETTER_S = 1.0
+BETTER_S = 2.0
 """Time in s for which a robot must have been a better root before it takes over."""
 LOST_ROUNDS = 2.2
 """Rounds without a plan, for each hop to the root, after which the root is lost."""
@@ -40,7 +40,7 @@ class Leadership:
         self.root, self.level = own_id, 0
         """Whose plans are kept, and how many hops away it is."""
         self.rank = FAR, own_id
-        """How good the root is: hops to the farthest robot, and its id; less is better."""
+        """How good the root is: tries to the farthest robot, and its id; less is better."""
         self._parent = own_id
         self._lost = -1, 0, 0.0
         """The lost root, as (root, our level then, time until which it is not accepted)."""
@@ -121,7 +121,7 @@ class Leadership:
             return False, False
         self.rank, self._has_turn = rank, has_turn
         self._told_at = max(at, self._told_at)
-        if self._own_rank(at) >= rank:
+        if self._own_rank(at)[0] >= reach:
             self._better_since = inf
         elif self._better_since == inf:
             self._better_since = at

@@ -130,7 +130,7 @@ class Planner:
         uses = {node: ticks.count(times.turn_s + each.all_s) for node, each in wanted.items()}
         dues = self._heeded(begin)
         most = MOST_TOLD - SPARE_TURNS * bool(dues)
-        found = stages(turns, uses, team.apart(), places.parents, ticks, most)
+        found = stages(turns, uses, team.apart(start), places.parents, ticks, most)
         if dues:
             keep = self._kept(begin, dues[0].qos, given, wanted)
             found = before(dues, self._own_id, ticks, begin, found, times.turn_s, keep)

@@ -20,16 +20,20 @@ class Apart:
     """Which robots of a team with these links are apart, as far as their links are known."""
 
     def __init__(self, edges: Edges) -> None:
-        self._near: dict[int, set[int]] = {}
+        self.near: dict[int, set[int]] = {}
+        """Each robot, and those that it hears or that hear it."""
         for one, others in edges.items():
             for other in others:
-                self._near.setdefault(one, {one}).add(other)
-                self._near.setdefault(other, {other}).add(one)
+                self.near.setdefault(one, {one}).add(other)
+                self.near.setdefault(other, {other}).add(one)
 
     def __call__(self, one: int, other: int) -> bool:
         """Whether two robots may send at once."""
-        near, far = self._near.get(one), self._near.get(other)
+        near, far = self.near.get(one), self.near.get(other)
         return near is not None and far is not None and near.isdisjoint(far)
+
+
+NONE_APART = Apart({})
 
 
 def stages(

@@ -5,10 +5,12 @@ from collections.abc import Collection, Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
-from sdrlinkd.link.access.reuse import Apart
+from sdrlinkd.link.access.reuse import NONE_APART, Apart
 from sdrlinkd.link.paths import Edges, distances
 from sdrlinkd.wire import FAR
 
+SETTLED_S = 5.0
+"""Time in s for which the same robots must have heard each other before two may send at once."""
 PRESENT_S = 3.5
 """Time in s after which a robot that was not heard is gone: three periods of its beacon."""
 
@@ -21,6 +23,8 @@ class Places(NamedTuple):
 
     levels: Mapping[int, int]
     parents: Mapping[int, int]
+    costs: Mapping[int, float]
+    """What a PDU from the root costs, in PDUs that are sent for it."""
 
     def is_behind(self, node: int, relay: int) -> bool:
         """Whether robot `node` hears plans through `relay`, directly or through others."""
@@ -45,6 +49,9 @@ class Team:
         self._expired_at = 0.0
         self._places: dict[int, Places] = {}
         self._apart: Apart | None = None
+        self._near: Mapping[int, Collection[int]] = {}
+        self._near_since = inf
+        """Since when the same robots hear each other, and who does."""
 
     def heard(self, node: int, at: float) -> None:
         """Note that we hear a robot directly."""
@@ -84,16 +91,25 @@ class Team:
             found = self._places[root] = places_of(root, self._edges())
         return found
 
-    def apart(self) -> Apart:
-        """Which robots may send at once."""
+    def apart(self, now: float) -> Apart:
+        """Which robots may send at once at `now`.
+
+        Where robots move, those that are three hops apart may soon be nearer; and they disturb each
+        other's receivers from farther away than they are heard.
+        """
         if self._apart is None:
             self._apart = Apart(self._edges())
-        return self._apart
+        if self._apart.near != self._near:
+            self._near, self._near_since = self._apart.near, now
+        return self._apart if now > self._near_since + SETTLED_S else NONE_APART
 
     def reach(self, root: int, others: Collection[int]) -> int:
-        """Hops from `root` to the farthest of `others`; FAR if that is not known."""
-        levels = self.places(root).levels
-        return min(FAR, max((levels.get(node, FAR) for node in others), default=FAR))
+        """PDUs that have to be sent until one of `root` is at the farthest of `others`.
+
+        That is the number of hops, more where links lose PDUs. FAR: it is not known.
+        """
+        costs = self.places(root).costs
+        return min(FAR, max((round(costs.get(node, FAR)) for node in others), default=FAR))
 
     def _link(self, one: int, other: int, at: float) -> None:
         link = min(one, other), max(one, other)
@@ -112,6 +128,9 @@ class Team:
         known = {node: dict(links) for node, links in self._lsa_edges.items()}
         edges: defaultdict[int, dict[int, float]] = defaultdict(dict, known)
         for one, other in self._link_at:
+            if one in known and other in known:
+                # Their LSAs know better.
+                continue
             edges[one].setdefault(other, 1.0)
             edges[other].setdefault(one, 1.0)
         return edges
@@ -119,7 +138,7 @@ class Team:
 
 def places_of(root: int, edges: Edges) -> Places:
     """Where robots are from `root`, over the best paths."""
-    _, parents = distances(edges, root)
+    costs, parents = distances(edges, root)
     levels = {root: 0}
 
     def level(node: int) -> int:
@@ -129,4 +148,4 @@ def places_of(root: int, edges: Edges) -> Places:
 
     for node in parents:
         level(node)
-    return Places(levels, {node: by for node, by in parents.items() if by != root})
+    return Places(levels, {node: by for node, by in parents.items() if by != root}, costs)

@@ -9,7 +9,7 @@ from sdrlinkd.link.repeat.gaps import Message
 
 PATIENCE_S = 0.005
 """Time in s for which a PDU may still come out of order."""
-OVERTAKEN_S = 0.5
+OVERTAKEN_S = 0.2
 """The same in s where it may wait at a relay, behind more urgent ones."""
 ACTIVE_S = 0.5
 """Time in s for which a class counts as used by a source."""

@@ -9,6 +9,9 @@ from sdrlinkd.wire import BROADCAST, LSA_NUMBERS, MAX_LOSS, Lsa, lsa_digest, sha
 
 MOST_ROBOTS = 32
 """Most robots of which LSAs are held."""
+LOSSY = 2.0
+"""Exponent of the expected number of tries in the cost of a link: two hops that lose nothing are
+better than one that loses a sixth each way, as repeats take time, and may be lost, too."""
 FORGOTTEN_S = 10.0
 """Time in s for which the LSA of a robot that cannot be reached is held."""
 LEAST_NEWS_S, LEAST_CHANGE_S = 0.1, 0.5
@@ -138,8 +141,9 @@ class LsaTable:
         edges: dict[int, dict[int, float]] = {node: {} for node in heard}
         for node, losses in heard.items():
             for other, loss in losses.items():
-                if loss < MAX_LOSS and heard.get(other, {}).get(node, MAX_LOSS) < MAX_LOSS:
-                    edges[other][node] = 1 / share_of(loss)
+                back = heard.get(other, {}).get(node, MAX_LOSS)
+                if loss < MAX_LOSS and back < MAX_LOSS:
+                    edges[other][node] = (share_of(loss) * share_of(back)) ** -LOSSY
         self.edges = edges
         reached, _ = distances(edges, self._own_id)
         self.reached = sorted(node for node in reached if node in self._held)

@@ -43,7 +43,7 @@ class Repetitions:
             return None
         mcs, n_told = group.mcs, 0 if group.is_relayed or group.announced else 1
         slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1 + n_told), sensed))
-        if slot is None and access.keeps_schedule:
+        if slot is None and (access.keeps_schedule or access.by_request is not None):
             # Slots may be made for one PDU, or for faster bursts.
             mcs = group.kept[0].mcs
             slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed))
