@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from statistics import median
 
 from benchmarks.report import Row, main
-from benchmarks.team import crowd_rows, rtwmp_rows
+from benchmarks.team import crowd_rows, rtwmp_rows, worst_rows
 from benchmarks.team.chain import Carried, carry
 from benchmarks.team.healing import PERIOD_S, heal
 from benchmarks.team.turnaround import wait_for_turns
@@ -16,6 +16,7 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
     yield from _chain(seed, quick)
     yield from _turnaround(seed, quick)
     yield from crowd_rows.rows(seed, quick)
+    yield from worst_rows.rows(seed, quick)
     n = 2 if quick else 20
     for name, to_all in (("reroute_s", False), ("reroute_to_all_s", True)):
         found = [heal(seed + i, to_all=to_all) for i in range(n)]
