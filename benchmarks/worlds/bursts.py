@@ -187,6 +187,10 @@ class Simulation:
             )
             if burst is None:
                 looks_at = max(now, link.next_wakeup(now))
+                if self._policy == "auction":
+                    later = now + self._block_s * pace
+                    chance = next_chance(station, self._policy, self._access, sensed, later)
+                    looks_at = max(looks_at, chance)
                 break
             self._send(station, burst)
         if looks_at < INFINITE:
