@@ -15,8 +15,8 @@ Case = tuple[Policy, int, int, float]
 
 def rows(seed: int, quick: bool) -> Iterator[Row]:
     """Urgent messages that waited longer than the plan says: an hour of 8, ten minutes of 24."""
-    ours = {8: (1, 15.0), 24: (1, 4.0)} if quick else {8: (6, 600.0), 24: (4, 150.0)}
-    others = {8: (1, 10.0), 24: (1, 4.0)} if quick else {8: (2, 150.0), 24: (1, 100.0)}
+    ours = {8: (1, 8.0), 24: (1, 3.0)} if quick else {8: (6, 600.0), 24: (4, 150.0)}
+    others = {8: (1, 4.0), 24: (1, 2.5)} if quick else {8: (2, 150.0), 24: (1, 100.0)}
     cases: list[Case] = [
         (policy, n, seed + i, length_s)
         for policy in (OURS, *PEERS)
