@@ -59,6 +59,12 @@ ROWS = {
         "grant_halfduplex_50ms_urgent_p99_over_frame_standing",
         "grant_halfduplex_50ms_urgent_p99_over_frame_request",
         *(f"chain5_mdr_{flow}" for flow in ("laser", "image", "joystick")),
+        *(
+            f"{each}_{n}" for n in (8, 24)
+            for each in (
+                "bound_broken", "longest_wait_over_bound", "urgent_in_outages_pct", "urgent_lost_pct",
+            )
+        ),
         *(f"mobile_8_mdr_{qos}" for qos in ("urgent", "latency", "default")),
         "reroute_s", "reroute_to_all_s",
         "urgent_p99_ms_8", "urgent_p99_ms_24", "carried_mbps_8", "carried_mbps_24",

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from statistics import median
 
 from benchmarks.report import Row, exactly, main
-from benchmarks.team import crowd_rows, rtwmp_rows
+from benchmarks.team import crowd_rows, rtwmp_rows, worst_rows
 from benchmarks.team.chain import Carried, carry
 from benchmarks.team.driving import AFTER_S, BEFORE_S, HEARD_DB, SIDE_M, drive
 from benchmarks.team.healing import PERIOD_S, heal
@@ -19,6 +19,7 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
     yield from exactly(_driving(seed, quick))
     yield from exactly(_turnaround(seed, quick))
     yield from exactly(crowd_rows.rows(seed, quick))
+    yield from exactly(worst_rows.rows(seed, quick))
     n = 2 if quick else 20
     for name, to_all in (("reroute_s", False), ("reroute_to_all_s", True)):
         found = [heal(seed + i, to_all=to_all) for i in range(n)]

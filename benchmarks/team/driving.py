@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from backends import AirParams, Track, World
-from benchmarks.team.teams import RATE_HZ, Flow, Policy, Team
+from benchmarks.team.teams import RATE_HZ, Flow, Policy, Strain, Team
 from sdrlinkd.config import ModemParams
 
 N = 8
@@ -60,8 +60,8 @@ def drive(policy: Policy, seed: int, duration_s: float) -> Drove:
             _flow("status", node, BASE, 1000, 1.0, at_s, duration_s, "default"),
         ]
     team = Team(
-        range(1, N + 1), None, flows, seed, policy, modem=MODEM, air=AIR, tracks=tracks,
-        keep_s=KEPT_S,
+        range(1, N + 1), None, flows, seed, policy, modem=MODEM, air=AIR,
+        strain=Strain(tracks=tracks, keep_s=KEPT_S),
     )  # fmt: skip
     team.simulation.run(end_s + REST_S)
     paths = _Paths(World(AIR, tracks), end_s + REST_S)

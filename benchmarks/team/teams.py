@@ -1,17 +1,19 @@
 """Robots with real links on an air of bursts: who hears whom, what they send, what arrives."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations
 from random import Random
 from typing import Literal, NamedTuple
 
-from backends import AirParams, LinkOverride, RadioParams, Track, World
+from backends import AirParams, LinkOverride, Outage, RadioParams, Track, World
 from benchmarks.worlds.arrivals import Arrival
 from benchmarks.worlds.bursts import Simulation
+from benchmarks.worlds.flight import Flight
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
     AccessParams,
+    Burst,
     ClockParams,
     Delivered,
     Link,
@@ -40,9 +42,6 @@ TOPIC_TYPE = "std_msgs/msg/UInt8MultiArray"
 Policy = Literal["csma", "minislot", "tdma", "grant", "auction"]
 
 
-NO_TRACKS: Mapping[int, Track] = {}
-
-
 class Flow(NamedTuple):
     """`n` messages of `size` octets that robot `src` sends every `period_s` from `begin_s` on.
 
@@ -60,6 +59,8 @@ class Flow(NamedTuple):
     qos: Literal["urgent", "latency", "default", "bulk"] = "default"
     is_random: bool = False
     """Whether the messages come at random, every `period_s` on average."""
+    least_s: float = 0.0
+    """Least time between two messages, beside that."""
 
     def times(self, rng: Random) -> list[float]:
         """When the messages are sent, in s."""
@@ -67,6 +68,7 @@ class Flow(NamedTuple):
         for _ in range(self.n):
             times.append(at)
             at += rng.expovariate(1 / self.period_s) if self.is_random else self.period_s
+            at += self.least_s
         return times
 
 
@@ -89,20 +91,34 @@ class Heard:
         return [at - self.sent_at[number] for number, at in self.at.items()]
 
 
+class Strain(NamedTuple):
+    """What makes the air of a team worse: robots that move, leave and come back, and losses."""
+
+    tracks: Mapping[int, Track] = {}
+    off: Mapping[int, Sequence[Outage]] = {}
+    lost: float = 0.0
+    """Probability that a robot does not get a PDU, beside what SNR and collisions cost."""
+    keep_s: float = 0.0
+    """Time for which the SNR of a pair counts."""
+    relays: bool = True
+    left: Callable[[int, Burst, Flight], None] = lambda *_: None
+    """Called with each burst and its sender."""
+
+
 class Team:
     """Robots `ids`, of which the pairs in `links` hear each other both ways.
 
-    Without `links`, their `tracks` through `air` tell how well. An SNR is kept for `keep_s`.
+    Without `links`, their tracks through `air` tell how well.
     """
 
     def __init__(
         self, ids: Iterable[int], links: Collection[tuple[int, int]] | None,
         flows: Sequence[Flow], seed: int, policy: Policy = "tdma", pdu_size: int = PDU_SIZE,
         turnaround_s: float = TURNAROUND_S, snr_db: float = GOOD_DB, modem: ModemParams = MODEM,
-        air: AirParams | None = None, tracks: Mapping[int, Track] = NO_TRACKS,
-        keep_s: float = 0.0,
+        air: AirParams | None = None, strain: Strain = Strain(),  # noqa: B008  # never changed
     ) -> None:  # fmt: skip
         self._pdu_size = pdu_size
+        self._relay = RelayParams(policy="auto" if strain.relays else "none")
         self._topics = [*dict.fromkeys(flow.name for flow in flows)]
         self.ids = list(ids)
         self.heard = [
@@ -128,7 +144,7 @@ class Team:
         }  # fmt: skip
         self.simulation = Simulation(
             air,
-            World(air, dict(tracks), deaf),
+            World(air, dict(strain.tracks), deaf, off=strain.off),
             radios,
             {node: self._link(node, registry, seed) for node in self.ids},
             modem,
@@ -136,8 +152,10 @@ class Team:
             AccessParams(policy=policy, nodes=self.ids, force=True),
             {node: self._arrivals(node) for node in self.ids},
             seed=seed,
-            keep_s=keep_s,
             listen=self._listen,
+            keep_s=strain.keep_s,
+            lost=strain.lost,
+            left=strain.left,
         )
 
     def forwarded_by(self, node: int, src: int, dst: int) -> list[int]:
@@ -174,7 +192,7 @@ class Team:
             registry,
             node,
             Random(100 * seed + node),
-            relay=RelayParams(policy="auto"),
+            relay=self._relay,
             clock=ClockParams(),
             repeat=RepeatParams(),
         )
@@ -186,14 +204,16 @@ class Team:
         )
         return link
 
-    def _arrivals(self, node: int) -> list[Arrival]:
+    def _arrivals(self, node: int) -> Iterator[Arrival]:
         """The messages of a robot in order of time; each begins with its number."""
-        return sorted(
-            Arrival(at, topic_id, CDR + number.to_bytes(4, "little") + bytes(heard.flow.size))
+        coming = sorted(
+            (at, topic_id, number, heard.flow.size)
             for (topic_id, src), heard in self._by_topic.items()
             if src == node
             for number, at in enumerate(heard.sent_at)
         )
+        for at, topic_id, number, size in coming:
+            yield Arrival(at, topic_id, CDR + number.to_bytes(4, "little") + bytes(size))
 
     def _listen(self, node: int, message: Delivered, now: float) -> None:
         heard = self._by_topic[message.topic_id, message.src]

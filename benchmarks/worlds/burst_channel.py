@@ -33,6 +33,8 @@ TAIL = 2 * phy.SENSE_WINDOW
 """Samples by which energy may seem to last longer than the header says."""
 PULSES_S = 0.1
 """Time for which a pulse is kept."""
+KEPT_BEFORE_S = 2e-3
+"""How long before a time a pulse may begin that matters after it."""
 KEEP_S = 1.0
 """Maximum time for which a burst is kept after its end."""
 
@@ -75,9 +77,10 @@ class _Node:
 class BurstChannel:
     """Nodes on one air, all on the same clock in s; power of `carrier_db` over noise is detected.
 
-    A pair's SNR and delay are kept for `keep_s`, inf: forever; outages take effect at once. Raises
-    ValueError for a fading air, for which there are no tables. The error tables are for the usual
-    grid, and other grids are close to it.
+    A pair's SNR and delay are kept for `keep_s`, inf: forever; outages take effect at once. Each
+    PDU is lost at each node with probability `lost`, whatever its SNR. Raises ValueError for a
+    fading air, for which there are no tables. The error tables are for the usual grid, and other
+    grids are close to it.
     """
 
     def __init__(
@@ -88,6 +91,7 @@ class BurstChannel:
         carrier_db: float = 6.0,
         keep_s: float = 0.0,
         grid: phy.Numerology = phy.OFDM_64_16,
+        lost: float = 0.0,
     ) -> None:
         if air.profile != "awgn":
             raise ValueError(f'air.profile: got "{air.profile}"; allowed in bursts: "awgn"')
@@ -95,6 +99,7 @@ class BurstChannel:
         self._grid = grid
         self._world = world
         self._keep_s = keep_s
+        self._lost = lost
         self._loud_db = decibel(10 ** (carrier_db / 10) - 1)
         self._rng = np.random.default_rng(seed)
         self._nodes: dict[int, _Node] = {}
@@ -162,7 +167,7 @@ class BurstChannel:
                 snr_db = head_snr_db(flight, node, at)
             else:
                 lost = lost_rate(shape.mcs, snr_db, shape.pdu_bytes)
-            if flight.draws[node][1 + number] >= lost:
+            if flight.draws[node][1 + number] >= lost + self._lost * (1 - lost):
                 read.append((node, snr_db))
         return read
 
@@ -200,14 +205,18 @@ class BurstChannel:
 
     def _heard_pulses(self, node: int, since: float, t: float) -> list[tuple[float, float]]:
         """(begin, end) of the pulses that a node has heard completely between two times."""
+        after = since - KEPT_BEFORE_S
+        late = [each for each in self._pulses if each.start_s > after]
+        if not late:
+            return []
         turn_s, tail_s = self._nodes[node].radio.turnaround_s, TAIL / self._air.rate_hz
         deaf = [
             (each.start_s - turn_s, each.start_s + each.length_s + turn_s)
-            for each in self._pulses
+            for each in late
             if each.sender == node and not self._nodes[node].radio.full_duplex
         ]
         found = []
-        for each in self._pulses:
+        for each in late:
             begin = each.arrives.get(node)
             if begin is None or begin <= since or begin + each.length_s + tail_s > t:
                 continue

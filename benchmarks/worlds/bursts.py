@@ -60,7 +60,8 @@ class Simulation:
 
     Decisions are made at the ends of blocks of `air.block_s`, as in a simulation of samples in
     lock-step. `watch` is called for every burst, `listen` for what a node receives, with its time.
-    `keep_s`: see BurstChannel. Raises ConfigError if the radios cannot support the access policy.
+    `left` is called for every burst of PDUs that begins to leave. `keep_s`, `lost`: see
+    BurstChannel. Raises ConfigError if the radios cannot support the access policy.
     `fit` turns the air's traits into those of another radio, such as one that needs its bursts
     earlier.
     """
@@ -79,9 +80,11 @@ class Simulation:
         rate: RateParams | None = None,
         seed: int = 0,
         keep_s: float = 0.0,
+        lost: float = 0.0,
         fit: Callable[[PduLinkTraits], PduLinkTraits] = lambda traits: traits,
         watch: Callable[[Flight], None] = lambda _: None,
         listen: Callable[[int, Delivered, float], None] = lambda *_: None,
+        left: Callable[[int, Burst, Flight], None] = lambda *_: None,
     ) -> None:
         self.now = 0.0
         self.pairs: defaultdict[tuple[int, int, int], Pair] = defaultdict(Pair)
@@ -91,8 +94,9 @@ class Simulation:
         self._access = access
         self._watch = watch
         self._listen = listen
+        self._left = left
         grid = phy.GRIDS[modem.grid]
-        self._medium = BurstChannel(air, world, seed, modem.carrier_db, keep_s, grid)
+        self._medium = BurstChannel(air, world, seed, modem.carrier_db, keep_s, grid, lost)
         self._events: list[_Event] = []
         self._numbers = count()
         self.stations: dict[int, Station] = {}
@@ -183,6 +187,10 @@ class Simulation:
             )
             if burst is None:
                 looks_at = max(now, link.next_wakeup(now))
+                if self._policy == "auction":
+                    later = now + self._block_s * pace
+                    chance = next_chance(station, self._policy, self._access, sensed, later)
+                    looks_at = max(looks_at, chance)
                 break
             self._send(station, burst)
         if looks_at < INFINITE:
@@ -210,6 +218,7 @@ class Simulation:
         self._at(left, _HEAR, link.confirm, burst, Outcome.SENT, flight.end_s * pace)
         self._at(self._block(flight.over_s), _SETTLE, self._medium.settle, flight)
         self._watch(flight)
+        self._left(link.own_id, burst, flight)
 
     def _hear(self, flight: Flight, number: int, pdu: bytes, nodes: list[int]) -> None:
         for node, snr_db in self._medium.readers(flight, number, nodes):

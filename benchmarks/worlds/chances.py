@@ -2,9 +2,14 @@
 
 from benchmarks.worlds.burst_channel import AirSense
 from benchmarks.worlds.station import Station
-from sdrlinkd.link import AccessParams, Sensed
+from sdrlinkd.link import MARGIN_S, AccessParams, Sensed
 
 INFINITE = float("inf")
+LIKE_NEW_S = 0.005
+"""Time of silence in s in which mini-slots grow by less than ALMOST_S."""
+ALMOST_S = 4e-6
+ASKED_S = 5e-3
+"""How often a robot is asked that waits for a plan of turns, in s."""
 
 
 def at_pace(sensed: AirSense, pace: float) -> Sensed:
@@ -30,11 +35,16 @@ def next_chance(
     """
     policy, traits = station.settled.access, station.traits
     if policy.by_request is not None:
-        return max(t, policy.by_request.turn_at(t + traits.lead_s) - traits.lead_s - traits.react_s)
+        turn_at = policy.by_request.turn_at(t + traits.lead_s) - traits.lead_s - traits.react_s
+        # Whoever waits for a plan is asked, too, to notice that nobody plans.
+        into_s = t % ASKED_S
+        asked_at = t if into_s <= traits.ahead_s else t - into_s + ASKED_S
+        return max(t, min(turn_at, asked_at))
     frame = policy.frame(t + traits.lead_s)
     carrier_end = -INFINITE if sensed.burst_at is None else sensed.idle_since
     if name == "auction":
-        return max(t, sensed.carrier_end, station.free_at - traits.lead_s)
+        t = max(t, sensed.carrier_end, station.free_at - traits.lead_s)
+        return _next_mini_slot(station, max(sensed.carrier_end, policy.own_end), t)
     if name in ("csma", "minislot"):
         return max(t, carrier_end, station.free_at - traits.gap_s)
     if frame is None:
@@ -53,3 +63,20 @@ def next_chance(
         if access.reuse and soonest + station.least_s < begin:
             return max(t, min(look, own))
     return max(t, own)
+
+
+def _next_mini_slot(station: Station, idle_since: float, t: float) -> float:
+    """Earliest time from `t` on at which an auction decides on one of its mini-slots.
+
+    That is once all before a mini-slot is known, and until it is too late for it.
+    """
+    traits, minislot_s = station.traits, station.settled.access.pause_s / 2
+    since_s = t - idle_since
+    if not 0 <= since_s < LIKE_NEW_S:
+        # Mini-slots grow with the time of silence.
+        return t
+    known_s = traits.pulse_s + 1.5 * traits.detect_s + MARGIN_S - ALMOST_S
+    into_s = since_s % minislot_s
+    if known_s <= into_s <= minislot_s - traits.lead_s + ALMOST_S:
+        return t
+    return t - into_s + known_s + minislot_s * (into_s > known_s)

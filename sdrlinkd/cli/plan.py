@@ -13,8 +13,11 @@ from sdrlinkd.config import load_config, make_setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.plan import (
     HOST_S,
+    MOST_ROBOTS,
+    AccessBound,
     LeftOut,
     Plan,
+    bounds_of,
     loads_from_bag,
     make_plan,
     names_in,
@@ -31,6 +34,13 @@ COLUMNS = (
 )  # fmt: skip
 
 
+WAITS = (
+    figure("robots"), words("policy"), words("the others have", 4, 11), figure("urgent"),
+    figure("latency"), figure("default"), figure("bulk"),
+)  # fmt: skip
+NOTHING = "no topics to plan; give --bag FILE, or topics with --topic NAME:RATE:SIZE"
+
+
 @app.command()
 def plan(
     config: Annotated[Path, typer.Option("--config", help="The daemon's configuration.")],
@@ -39,9 +49,10 @@ def plan(
     ] = None,
     bag: Annotated[Path | None, typer.Option(help="Take rates and sizes from a recording.")] = None,
     robots: Annotated[
-        int | None,
+        str | None,
         typer.Option(
-            min=1, max=255, help="Robots that each send this traffic; default: access.nodes."
+            help="Robots that each send this traffic, at most 32, or a range such as 1..32 for the "
+            "waits for the air; default: access.nodes."
         ),
     ] = None,
     turnaround: Annotated[
@@ -53,11 +64,20 @@ def plan(
     ] = f"{1e3 * HOST_S:g}ms",
     as_json: AsJson = False,
 ) -> None:
-    """Plan airtime and worst-case latency by topic; exit code 1 when the traffic does not fit."""
+    """Plan airtime and worst-case latency by topic, and the longest wait for the air by class.
+
+    Exit code 1 when the traffic does not fit. Without topics, only the waits are printed.
+    """
     setup = make_setup(load_config(config), config.parent, str(config))
     turnaround_s = None if turnaround is None else seconds(turnaround, "--turnaround")
     host_s, has_numbers = seconds(host, "--host"), setup.has_numbers
-    setting = setting_of(setup.config, setup.node_id, robots, turnaround_s, host_s, has_numbers)
+    counts = None if robots is None else _counts(robots)
+    n = counts[0] if counts is not None and len(counts) == 1 else None
+    setting = setting_of(setup.config, setup.node_id, n, turnaround_s, host_s, has_numbers)
+    bounds = list(setting.bounds)
+    refused: list[str] = []
+    if counts is not None and n is None:
+        bounds, refused = bounds_of(setup.config, setup.node_id, counts, turnaround_s)
     registry, policies = setup.registry, setup.policies
     with contextlib.ExitStack() as stack:
         recording = None if bag is None else stack.enter_context(contextlib.closing(open_bag(bag)))
@@ -74,14 +94,19 @@ def plan(
             )
             found, left_out = loads_from_bag(messages, registry, policies, setup.config.topics)
             loads += [load for load in found if load.topic_id not in told]
-    if not loads:
+    if not loads and left_out:
         raise UserError(_nothing(left_out))
     made = make_plan(sorted(loads), policies, setting, left_out)
+    made = made._replace(bounds=bounds, notes=[*made.notes, *refused])
     if as_json:
         topics = [{**each._asdict(), "is_late": each.is_late} for each in made.topics]
         classes = [each._asdict() for each in made.classes]
         left = [each._asdict() for each in made.left_out]
-        text = {**made._asdict(), "topics": topics, "classes": classes, "left_out": left}
+        waits = [each._asdict() for each in made.bounds]
+        text = {
+            **made._asdict(), "topics": topics, "classes": classes, "left_out": left,
+            "bounds": waits,
+        }  # fmt: skip
         typer.echo(msgspec.json.encode(text).decode())
     else:
         console = screen_console()
@@ -108,13 +133,44 @@ def lines(made: Plan) -> list[FittedTable | str]:
     if made.robots > 1 and made.policy == "none":
         all_of = f" by each of {made.robots} robots"
     verdict = "feasible" if made.is_feasible else "NOT feasible"
+    if not made.topics:
+        return [*_waits(made.bounds), NOTHING, *made.notes]
     asked = f"{100 * made.air:.3g} % of the channel's capacity requested{all_of}: {verdict}"
     left_out = [f"left out: {name} ({n} messages): {why}" for name, n, why in made.left_out]
-    return [table, asked, *made.advice, *made.notes, *left_out]
+    return [table, asked, *made.advice, *_waits(made.bounds), *made.notes, *left_out]
+
+
+def _waits(bounds: list[AccessBound]) -> list[FittedTable | str]:
+    """The longest waits for the air as a table, if there are any."""
+    found: dict[int, list[AccessBound]] = {}
+    for each in bounds:
+        if each.first_s < float("inf"):
+            found.setdefault(each.robots, []).append(each)
+    if not found:
+        return []
+    table = FittedTable("longest wait for the air", WAITS)
+    for n, of in found.items():
+        for others, waits_s in (
+            ("less urgent", [each.first_s for each in of]),
+            ("the same", [each.all_s for each in of]),
+        ):
+            cells = (f"{1e3 * each:.1f} ms" for each in waits_s)
+            table.add(str(n), of[0].policy, others, *cells)
+    return [table]
+
+
+def _counts(text: str) -> list[int]:
+    """Numbers of robots, given as `8` or `1..32`. Raises UserError."""
+    parts = text.split("..")
+    whole = [int(each) for each in parts if each.isdecimal()]
+    if len(whole) != len(parts) or len(parts) > 2 or not 1 <= whole[0] <= whole[-1] <= MOST_ROBOTS:
+        raise UserError(
+            f"--robots: got {text}; allowed: 1 to {MOST_ROBOTS}, or a range such as "
+            f"1..{MOST_ROBOTS}"
+        )
+    return list(range(whole[0], whole[-1] + 1))
 
 
 def _nothing(left_out: list[LeftOut]) -> str:
-    if not left_out:
-        return "nothing to plan; give --bag FILE, or topics with --topic NAME:RATE:SIZE"
     names = ", ".join(f"{each.name} ({each.why})" for each in left_out)
     return f"--bag: no topic in it can be planned: {names}; give topics with --topic NAME:RATE:SIZE"

@@ -1,7 +1,12 @@
 """The link: queues, packing, duplicates, ages and the ledger, computed from inputs and `now`."""
 
 from sdrlinkd.link.access import (
+    AUCTION_PATIENCE,
+    CLOCK_ERROR_S,
+    LEAST_TURNS,
+    MARGIN_S,
     AccessParams,
+    Csma,
     Settled,
     check_access,
     may_share,
@@ -67,9 +72,13 @@ from sdrlinkd.link.transmit import Burst, Fit, Outcome, RateControl, RateParams
 
 __all__ = [
     "AS_CONFIGURED",
+    "AUCTION_PATIENCE",
     "CDR_HEADER_SIZE",
+    "CLOCK_ERROR_S",
     "DEFAULT_POLICY",
     "IDLE_SHARE",
+    "LEAST_TURNS",
+    "MARGIN_S",
     "NOT_RETAINED",
     "OVERRUN",
     "QOS_BY_LABEL",
@@ -84,6 +93,7 @@ __all__ = [
     "ClassParams",
     "ClassesParams",
     "ClockParams",
+    "Csma",
     "DefaultParams",
     "Deflated",
     "Delivered",

@@ -1,8 +1,9 @@
 """Predicts whether traffic fits the channel, before anything is sent."""
 
 from sdrlinkd.plan.air import Setting
+from sdrlinkd.plan.bounds import AccessBound, access_bounds
 from sdrlinkd.plan.model import ClassPlan, Plan, TopicPlan, make_plan
-from sdrlinkd.plan.setting import HOST_S, setting_of
+from sdrlinkd.plan.setting import HOST_S, MOST_ROBOTS, bounds_of, setting_of
 from sdrlinkd.plan.traffic import (
     LeftOut,
     Load,
@@ -14,12 +15,16 @@ from sdrlinkd.plan.traffic import (
 
 __all__ = [
     "HOST_S",
+    "MOST_ROBOTS",
+    "AccessBound",
     "ClassPlan",
     "LeftOut",
     "Load",
     "Plan",
     "Setting",
     "TopicPlan",
+    "access_bounds",
+    "bounds_of",
     "loads_from_bag",
     "make_plan",
     "names_in",

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from sdrlinkd.link import ClassesParams, PduLinkTraits, Settled
 from sdrlinkd.modem import Airtimes
+from sdrlinkd.plan.bounds import AccessBound
 
 
 class Setting(NamedTuple):
@@ -26,6 +27,8 @@ class Setting(NamedTuple):
     """Whether messages that are too large for 255 fragments go in parts (the key `auto`)."""
     repeats: float = 0.0
     """Share of airtime that is left for repeats."""
+    bounds: tuple[AccessBound, ...] = ()
+    """The longest wait for the air, by class."""
     notes: tuple[str, ...] = ()
     """What a person should know about the assumptions of the plan, in sentences."""
 

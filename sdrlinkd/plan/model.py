@@ -14,6 +14,7 @@ from sdrlinkd.link import (
 )
 from sdrlinkd.plan.advice import slower
 from sdrlinkd.plan.air import Setting
+from sdrlinkd.plan.bounds import AccessBound
 from sdrlinkd.plan.response import FOREVER, Task, worst_s
 from sdrlinkd.plan.supply import Supply, supply_of
 from sdrlinkd.plan.traffic import LeftOut, Load, after_policy
@@ -76,6 +77,8 @@ class Plan(NamedTuple):
     """Share of airtime that bursts can use with the access policy on this radio."""
     notes: list[str] = []  # noqa: RUF012  # never changed
     left_out: list[LeftOut] = []  # noqa: RUF012
+    bounds: list[AccessBound] = []  # noqa: RUF012
+    """The longest waits for the air, by number of robots and class."""
 
 
 def make_plan(
@@ -102,7 +105,7 @@ def make_plan(
     settled = setting.settled
     return Plan(
         topics, classes, sum(asked), not advice, advice, setting.robots, settled.policy,
-        settled.share, list(setting.notes), list(left_out),
+        settled.share, list(setting.notes), list(left_out), list(setting.bounds),
     )  # fmt: skip
 
 

@@ -1,14 +1,16 @@
 """Derives the setting of a plan from a configuration."""
 
+from collections.abc import Sequence
 from random import Random
 
 import msgspec
 
 from sdrlinkd.config import Config
-from sdrlinkd.errors import ConfigError
+from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.link import PduLinkTraits, Settled, percent, settle
 from sdrlinkd.modem import PresumedRadio, presume_radio
 from sdrlinkd.plan.air import Setting
+from sdrlinkd.plan.bounds import AccessBound, access_bounds
 
 HOST_S = 0.01
 """Largest latency in s that the machines at both ends add (buses, event loops and demodulation), on
@@ -16,6 +18,8 @@ a machine with two cores that also runs other programs."""
 
 
 LAST_ID = 254
+MOST_ROBOTS = 32
+"""Most robots of a plan."""
 
 
 def setting_of(
@@ -35,13 +39,19 @@ def setting_of(
     access = config.access
     guessed: list[str] = []
     if robots is not None:
+        if not 1 <= robots <= MOST_ROBOTS:
+            raise UserError(f"--robots: got {robots}; allowed: 1 to {MOST_ROBOTS}")
         policy = access.policy if robots > 1 else "none"
         nodes, own_id = list(range(1, robots + 1)), 1
         access = msgspec.structs.replace(access, policy=policy, nodes=nodes)
     if access.policy == "csma" and not access.nodes:
         access = msgspec.structs.replace(access, nodes=[own_id, own_id % LAST_ID + 1])
         guessed = ["access.nodes is empty: planned for two robots (--robots)"]
+    elif not access.nodes:
+        guessed = ["access.nodes is empty: planned for one robot (--robots)"]
     n = max(1, len(set(access.nodes)))
+    if n > MOST_ROBOTS:
+        raise UserError(f"access.nodes: got {n} robots; allowed in a plan: at most {MOST_ROBOTS}")
     forced = msgspec.structs.replace(access, force=True)
     settled = settle(forced, own_id, radio.traits, radio.longest_s, Random(0))
     notes = guessed + _notes(config, radio, settled, n, host_s)
@@ -51,10 +61,26 @@ def setting_of(
         notes.append(f"the daemon refuses this: {error}")
     modem = config.modem
     longest_s = radio.traits.longest_burst_s[modem.mcs]
+    one_s = radio.airtimes.airtime_s(modem.mcs, 1)
+    bounds = access_bounds(settled, radio.traits, n, radio.longest_s, one_s)
     return Setting(
         radio.airtimes, config.inner_pdu_size, modem.mcs, longest_s, config.classes, n, settled,
-        radio.traits, host_s, has_numbers, config.repeat.share, tuple(notes),
+        radio.traits, host_s, has_numbers, config.repeat.share, tuple(bounds), tuple(notes),
     )  # fmt: skip
+
+
+def bounds_of(
+    config: Config, own_id: int, robots: Sequence[int], turnaround_s: float | None = None
+) -> tuple[list[AccessBound], list[str]]:
+    """(bounds for each number of robots, why there are none for some). Raises UserError."""
+    found: list[AccessBound] = []
+    notes: list[str] = []
+    for n in robots:
+        try:
+            found += setting_of(config, own_id, n, turnaround_s).bounds
+        except ConfigError as error:
+            notes.append(f"{n} robots: {error}")
+    return found, notes
 
 
 def _notes(

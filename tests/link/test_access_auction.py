@@ -135,6 +135,46 @@ def test_foreign_energy_as_short_as_a_pulse_costs_air_and_silences_nobody(per_s)
         assert ("disturbs" in air.nodes[0].access.state) == (per_s == 500)
 
 
+def test_one_that_counts_from_another_burst_disturbs_until_the_next_one():
+    """A robot that comes back into range challenges at other times; the next burst corrects it."""
+    access = make_access(params("auction", [1, 2]), 1, FAST, LONGEST_S, Random(1))
+    minislot_s = access.pause_s / 2
+    round_s = access.round_s
+
+    def fruitless(end):
+        """Two contests without a burst, after a burst that ended at `end`."""
+        began = [end + minislot_s + 1e-6 + i * round_s for i in range(2)]
+        pulses, now = [], end
+        while now < began[1] + round_s + minislot_s:
+            now += 1e-4
+            pulses = [each for each in began if each + 2e-4 < now]
+            idle_since = max([end, *pulses])
+            sensed = Sensed(now, idle_since, None, end, end - 0.004, tuple(pulses))
+            wish = Wish(now + FAST.lead_s, Qos.BULK, SHORT_S, sensed)
+            slot = access.slot(wish)
+            assert slot is None or slot.start >= end
+
+    def burst(end):
+        access.heard(2, end - 0.004, False)
+        access.take_want(Want(2, 3, 0, 0, 200, 0), end - 0.004)
+        sensed = Sensed(end + 1e-4, end, end - 0.004, end, end - 0.004)
+        access.slot(Wish(end + 1e-4 + FAST.lead_s, Qos.BULK, SHORT_S, sensed))
+
+    burst(1.0)
+    assert not access.lacks
+    fruitless(1.0)
+    assert access.lacks
+    assert "disturbs" in access.state
+    burst(1.02)
+    assert not access.lacks
+    fruitless(1.02)
+    assert access.lacks
+    burst(1.04)
+    assert access.lacks, "it goes on"
+    burst(2.2)
+    assert not access.lacks
+
+
 def test_after_long_silence_all_may_begin_at_once():
     for seed in range(3):
         air = make_air(4, seed)

@@ -188,8 +188,6 @@ def test_the_plan_reads_like_this(tmp_path, capsys):
     assert "NOT feasible" in told.out
 
 
-def test_a_plan_without_traffic_or_without_an_air_is_refused(tmp_path, capsys):
-    code, told = plan_text(tmp_path, capsys)
-    assert (code, "give --bag FILE" in told.err) == (2, True)
+def test_a_plan_without_an_air_is_refused():
     with pytest.raises(UserError, match="has no channel"):
         setting_of(parse_config(""), 1)

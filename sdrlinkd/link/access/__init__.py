@@ -5,6 +5,7 @@ that fits the radio. It never reads a message, and decides only when to send.
 """
 
 from sdrlinkd.link.access.auction import LEAST_BID_ROOM, Auction
+from sdrlinkd.link.access.auction import PATIENCE as AUCTION_PATIENCE
 from sdrlinkd.link.access.auto import Settled, may_share, percent, settle
 from sdrlinkd.link.access.base import Access, Slot, Wish
 from sdrlinkd.link.access.by_auction import ByAuction
@@ -28,7 +29,7 @@ from sdrlinkd.link.access.minislot import LEVELS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
 from sdrlinkd.link.access.requests import Due, Waiting, together, waiting_of, want_of
 from sdrlinkd.link.access.reuse import Apart, stages, told
-from sdrlinkd.link.access.round_plan import Times, before, plan, shares
+from sdrlinkd.link.access.round_plan import LEAST_TURNS, Times, before, plan, shares
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S, Tdma
 from sdrlinkd.link.access.tdma_states import STEPS as TDMA_STEPS
@@ -37,12 +38,14 @@ from sdrlinkd.link.access.turns import ALMOST_S, Ticks
 
 __all__ = [
     "ALMOST_S",
+    "AUCTION_PATIENCE",
     "CLOCK_ERROR_S",
     "CSMA_STEPS",
     "CSMA_WINDOWS",
     "FORGET_S",
     "LEAST_BID_ROOM",
     "LEAST_ROOM",
+    "LEAST_TURNS",
     "LEVELS",
     "LISTEN_S",
     "LONGEST_APART_S",

@@ -34,7 +34,8 @@ and takes part in the contest with class latency at least."""
 FRUITLESS = 2
 """Rounds with pulses and without a burst from which the pulses count as interference."""
 DISTURBED_S = 1.0
-"""Time in s for which pulses are not used after interference."""
+"""Time in s for which pulses are not used after interference, if it comes again within this time.
+First it is until the next burst, from which a robot that just came into range counts as well."""
 MUTE = 20
 """Bursts in sequence without a WANT from which a robot takes no part. Repeats have none."""
 LEAST_BID_ROOM = WANT_SIZE + 32
@@ -77,8 +78,9 @@ class Auction(BusyChannel):
         self._contest: tuple[float, Contest] | None = None
         """Our part in a contest, and the begin of its round."""
         self._fruitless = 0
-        self._disturbed_until = -inf
+        self._disturbed_at, self._disturbed_until = -inf, -inf
         self._is_disturbed = False
+        self._is_first = False  # Whether that is only until the next burst.
         self._mute = Sightings()
         """Robots whose bursts do not tell what they want."""
         self._seen_bursts = 0
@@ -100,9 +102,12 @@ class Auction(BusyChannel):
             f"auction: {len(self._nodes)} robots, mini-slots of {self._minislot_s * 1e3:.3g} ms, "
             f"contest in {self.round_s * 1e3:.3g} ms"
         )
-        if self._is_disturbed:
-            text += "; turns without pulses, as something disturbs them"
-        return text
+        return text + "; turns without pulses, as something disturbs them" * self._is_disturbed
+
+    @property
+    def lacks(self) -> str:  # type: ignore[override]
+        """A quiet air, while something disturbs the pulses."""
+        return "an air without other pulses" if self._is_disturbed else ""
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # the same for all classes
         """Mean wait in s: a quiet hand-over."""
@@ -166,6 +171,7 @@ class Auction(BusyChannel):
         self._before = self._asked, self._wants.silent_since(self._own_id)
         self._wants.on_air(self._own_id, end)
         self._contest, self._fruitless = None, 0
+        self._all_agree()
         self._asked = self._wants.n_bursts, end
 
     def not_sent(self, start: float) -> None:
@@ -199,13 +205,21 @@ class Auction(BusyChannel):
         if end <= self._looked_at:
             return
         self._looked_at, self._fruitless = end, 0
+        self._all_agree()
         if sensed.carrier_at != self._told_at:
             self._wants.missed(end)
 
     def _count_fruitless(self, place: Place) -> None:
         self._fruitless += place.fruitless
         if self._fruitless >= FRUITLESS:
-            self._disturbed_until, self._fruitless = place.start + DISTURBED_S, 0
+            self._is_first = place.start > self._disturbed_at + DISTURBED_S
+            self._disturbed_at, self._fruitless = place.start, 0
+            self._disturbed_until = place.start + DISTURBED_S
+
+    def _all_agree(self) -> None:
+        """Use pulses again after the first burst, as all count from its end."""
+        if self._is_first:
+            self._disturbed_until = -inf
 
     def _nobody_came(self, now: float, since: float) -> None:
         """Forget what the robot wants that was to send next, as it did not.

@@ -64,6 +64,13 @@ class Access(Protocol):
         """The policy's state and times, as text for people."""
 
     @property
+    def lacks(self) -> str:
+        """What this robot has to hear before it knows its turns again, in words; empty: nothing.
+
+        `state` says it, too. Meanwhile, no bound of the time until a turn holds.
+        """
+
+    @property
     def round_s(self) -> float:
         """Longest time in s until every robot has had a turn; 0 if there are no turns."""
 
@@ -88,6 +95,10 @@ class Access(Protocol):
     @property
     def keeps_schedule(self) -> bool:
         """Whether the policy announces a schedule to other robots."""
+
+    @property
+    def own_end(self) -> float:
+        """Time when our own last burst ends."""
 
     @property
     def by_request(self) -> ByRequest | None:
@@ -145,6 +156,7 @@ class BusyChannel:
     Its defaults are those of a policy without turns, pauses and schedule.
     """
 
+    lacks = ""
     round_s = 0.0
     pause_s = 0.0
     share = 1.0

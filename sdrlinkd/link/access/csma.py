@@ -25,6 +25,10 @@ WINDOWS = {
 }
 
 
+MOST_SLOTS = 1000
+"""Slots after which a chance to begin counts as none."""
+
+
 class State(Enum):
     """State of the backoff: whether a start has been drawn for the next burst."""
 
@@ -101,6 +105,17 @@ class Csma(BusyChannel):
         nobody_else = n * chance * (1 - chance) ** (n - 1) / anybody
         idle_s = self._dwait_s + (waits + 1 / anybody - 1) * self._slottime_s
         return nobody_else * burst_s / (burst_s + idle_s)
+
+    def begins_first(self, qos: Qos, others: Qos, n: int) -> float:
+        """Chance that class `qos` begins before `n` robots with a class `others` after a burst."""
+        (own_waits, own), (their_waits, theirs) = WINDOWS[qos], WINDOWS[others]
+        chance, later = min(1.0, own * self._persist), 1 - min(1.0, theirs * self._persist)
+        found, nobody = 0.0, 1.0
+        for slot in range(own_waits, own_waits + MOST_SLOTS):
+            nobody_else = later ** (n * max(0, slot - their_waits + 1))
+            found += nobody * chance * nobody_else
+            nobody *= 1 - chance
+        return found
 
     def slot(self, wish: Wish) -> Slot | None:
         """The drawn slot, once all slots before it were sensed idle."""

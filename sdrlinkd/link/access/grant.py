@@ -18,7 +18,7 @@ from sdrlinkd.link.access.own_request import OwnRequest
 from sdrlinkd.link.access.planner import PATIENCE_S, Planner
 from sdrlinkd.link.access.requests import Waiting
 from sdrlinkd.link.access.round_plan import MOST_TOLD, Times
-from sdrlinkd.link.access.sightings import Sightings
+from sdrlinkd.link.access.sightings import Sightings, schedule_notices
 from sdrlinkd.link.access.tdma_states import Happens
 from sdrlinkd.link.access.team import Team
 from sdrlinkd.link.access.turns import ALMOST_S, Turn
@@ -74,7 +74,7 @@ class Grants(BusyChannel):
         self._leads = Leadership(own_id, self._team, self.round_s, begin_s)
         self._planner = Planner(own_id, self._team, times)
         self._request = OwnRequest(own_id, times, self.round_s)
-        self._rounds = KnownRounds(own_id, times.turn_s)
+        self._rounds = KnownRounds(own_id, times.turn_s, times.root_s)
         self._behind: dict[int, WantRecord] = {}
         """Requests to pass on to the root."""
         self._tried = -inf, False
@@ -82,6 +82,7 @@ class Grants(BusyChannel):
         self._frame: tuple[int, float, Frame] | None = None
         """The last FRAME, as (who told it, when, what)."""
         self._strangers, self._outsiders = Sightings(), Sightings()
+        self._asked_at = -inf  # Or when we heard somebody last.
 
     @property
     def state(self) -> str:
@@ -94,10 +95,18 @@ class Grants(BusyChannel):
             doing = f"planned by robot {leads.root}"
             if leads.level > 1:
                 doing += f", {leads.level} hops away"
+            if self.lacks:
+                doing += f", without {self.lacks}"
         return (
             f"grant: {len(self._team.nodes)} robots, rounds of at most {1e3 * self.round_s:.3g} "
             f"ms, guard {1e3 * self._times.ticks.guard_s:.3g} ms; {doing}"
         )
+
+    @property
+    def lacks(self) -> str:  # type: ignore[override]
+        """A plan, while listening for one, and if one was not heard: no turn is known then."""
+        leads, lacks = self._leads, self._rounds.lacks(self._asked_at)
+        return "" if leads.is_root else lacks if leads.follows else "a plan"
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # the same for all classes
         """Mean wait in s: half a round."""
@@ -144,6 +153,7 @@ class Grants(BusyChannel):
     def slot(self, wish: Wish) -> Slot | None:
         """Our turn, from its begin or from `earliest` on."""
         earliest, leads = wish.earliest, self._leads
+        self._asked_at = max(self._asked_at, wish.sensed.until)
         # While our last burst is on the air, `earliest` is not the present.
         latest = min(earliest, wish.sensed.until + self._lead_s) + self._look_s
         if leads.begins(earliest, wish.sensed):
@@ -215,6 +225,7 @@ class Grants(BusyChannel):
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """Note that we hear robot `src` directly."""
+        self._asked_at = max(self._asked_at, at)
         if not is_relayed:
             self._team.heard(src, at)
 
@@ -268,17 +279,7 @@ class Grants(BusyChannel):
 
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that keep another schedule."""
-        outside = [
-            f"robot {src} announces a schedule and is ignored: it or the schedule's root is not in "
-            "access.nodes; list all robots there, at every robot, or look who sends it"
-            for src in self._outsiders.lately(now)
-        ]
-        differing = [
-            f"robot {src} keeps a different schedule; give both the same [access], and radios of "
-            f"one kind (ours: {self.state})"
-            for src in self._strangers.lately(now)
-        ]
-        return outside + differing
+        return schedule_notices(self._outsiders, self._strangers, self.state, now)
 
     def _begin_anew(self) -> None:
         """Forget the rounds of another root."""

@@ -10,12 +10,16 @@ from sdrlinkd.wire import ANYBODY, Grant
 class KnownRounds:
     """The rounds that go on or will begin, as far as robot `own_id` knows them.
 
-    Two plans whose rounds begin less than `same_s` apart may be the same.
+    Two plans whose rounds begin less than `same_s` apart may be the same. A plan is known `root_s`
+    after the end of the last round.
     """
 
-    def __init__(self, own_id: int, same_s: float) -> None:
+    def __init__(self, own_id: int, same_s: float, root_s: float) -> None:
         self._own_id = own_id
         self._same_s = same_s
+        self._root_s = root_s
+        self._had_turn = False
+        """Whether a plan of this root had a turn of ours."""
         self._rounds: list[Round] = []
         self.plan: tuple[float, Grant] | None = None
         """The root's last plan, and the time from which its begin counts."""
@@ -27,9 +31,16 @@ class KnownRounds:
         """The last round that is known."""
         return self._rounds[-1] if self._rounds else None
 
+    def lacks(self, now: float) -> str:
+        """What has not come that should have: the next plan, or a first turn of ours."""
+        last = self.last
+        if last is None or now > last.end + self._root_s:
+            return "a plan"
+        return "" if self._had_turn else "a turn"
+
     def forget(self) -> None:
         """Begin anew with another root."""
-        self._rounds, self.plan = [], None
+        self._rounds, self.plan, self._had_turn = [], None, False
 
     def made(self, found: Round) -> None:
         """Go on with a round of our own."""
@@ -43,6 +54,7 @@ class KnownRounds:
             # Another robot has passed on the same plan.
             return False
         self.plan = since, grant
+        self._had_turn |= any(turn.node == self._own_id for turn in found.turns)
         self._rounds = [*(each.until(found.begin) for each in self._rounds[-1:]), found]
         return True
 

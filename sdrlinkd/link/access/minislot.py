@@ -73,14 +73,22 @@ class MiniSlots(BusyChannel):
         self._own_src: int | None = None
         """Source of the PDUs that we sent last, if we relayed them."""
         self._slots = OwnSlots(minislot_s, SECTIONS * len(nodes))
+        self._is_last = False
+        """Whether our next mini-slot comes after those of all others."""
 
     @property
     def state(self) -> str:
         """Policy, robots and times, for people."""
-        return (
+        text = (
             f"minislot: {len(self._nodes)} robots, {self._minislot_s * 1e3:.3g} ms each, round in "
             f"{self.round_s * 1e3:.3g} ms"
         )
+        return f"{text}; last of all, as the last burst was not read" if self._is_last else text
+
+    @property
+    def lacks(self) -> str:  # type: ignore[override]
+        """A burst that tells the order, if the last one could not be read."""
+        return "a burst that it can read" if self._is_last else ""
 
     def mean_wait_s(self, qos: Qos) -> float:
         """Mean wait in s: all mini-slots of the higher level, and half of those of our level."""
@@ -124,6 +132,7 @@ class MiniSlots(BusyChannel):
         n = len(self._nodes)
         level = 0 if qos <= Qos.LATENCY else 1
         ended, src = self._what_ended(idle_since, sensed)
+        self._is_last = ended not in FIRST
         if ended not in FIRST:
             return LEVELS * n + self._rank
         first = self._nodes.index(src) + FIRST[ended]

@@ -23,6 +23,8 @@ SPARE_TURNS = 2
 """Turns of a round beyond one for each robot: for those who are not here, and a second one."""
 MOST_TOLD = MOST_TURNS + SPARE_TURNS
 """Most turns in a plan."""
+LEAST_TURNS = MOST_TOLD - 1 - 2
+"""Least turns of a round in which two robots share the budget; one turn may be for anybody."""
 STANDS = 0.5
 """Share of a round's budget that passes between two turns of a robot that does not want any."""
 
@@ -48,6 +50,11 @@ class Times(NamedTuple):
         least_s = self.turn_s + self.ticks.guard_s + self.ticks.tick_s
         turns_s = (others + SPARE_TURNS) * least_s + (2 + others) * self.turn_s
         return turns_s + self.budget_s + self.react_s + self.hears_s
+
+    @property
+    def root_s(self) -> float:
+        """The longest time from the end of a round until the plan of the next one is known."""
+        return self.hears_s + 2 * self.turn_s + self.budget_s + self.react_s
 
     def carries(self, n: int) -> float:
         """Share of the budget in a round of `n` robots that all want more than they get."""

@@ -28,3 +28,20 @@ class Sightings:
 
     def _is_lately(self, src: int, now: float) -> bool:
         return src in self._seen and now - self._seen[src][1] < FORGET_S
+
+
+def schedule_notices(
+    outsiders: Sightings, strangers: Sightings, state: str, now: float
+) -> list[str]:
+    """Sentences on robots with a schedule that are not listed, or whose schedule is not ours."""
+    outside = [
+        f"robot {src} announces a schedule and is ignored: it or the schedule's root is not in "
+        "access.nodes; list all robots there, at every robot, or look who sends it"
+        for src in outsiders.lately(now)
+    ]
+    differing = [
+        f"robot {src} keeps a different schedule; give both the same [access], and radios of one "
+        f"kind (ours: {state})"
+        for src in strangers.lately(now)
+    ]
+    return outside + differing

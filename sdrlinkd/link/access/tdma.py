@@ -112,6 +112,11 @@ class Tdma(BusyChannel):
             f"{self._guard_s * 1e3:.3g} ms; {doing}"
         )
 
+    @property
+    def lacks(self) -> str:  # type: ignore[override]
+        """A schedule, while listening for one."""
+        return "a schedule" if self.role is State.LISTENING else ""
+
     def carries(self, burst_s: float) -> float:
         """Share of airtime of bursts, as slots lose guard times and gaps."""
         open_s = self._slot_s - self._guard_s
