@@ -3,6 +3,7 @@
 from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.model import ClassPlan, Plan, TopicPlan, make_plan
 from sdrlinkd.plan.setting import HOST_S, setting_of
+from sdrlinkd.plan.team import team_worst_s
 from sdrlinkd.plan.traffic import (
     LeftOut,
     Load,
@@ -25,5 +26,6 @@ __all__ = [
     "names_in",
     "parse_load",
     "setting_of",
+    "team_worst_s",
     "with_declared",
 ]
