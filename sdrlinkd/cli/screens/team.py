@@ -11,7 +11,7 @@ from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
 EVERYONE = 255
 COLUMNS = (
-    words("robot", least=5), words("topic", least=8), words("class", 4, 7), figure("Hz"),
+    words("robot", least=5), words("topic", least=8), words("class", least=7), figure("Hz"),
     figure("bytes", 2), words("to", least=3), words("over", least=4), figure("air"),
     words("word", least=8),
 )  # fmt: skip
@@ -38,8 +38,8 @@ def team_screen(
         )  # fmt: skip
     refused = sum(flow.admitted is False for flow in report.flows)
     said = (
-        f"this is robot {own}; robot {report.planner} decides: {report.admitted_pct:.1f} of {report.limit_pct:.1f} % of "
-        "the air are taken"
+        f"this is robot {own}; robot {report.planner} decides: {report.admitted_pct:.1f} of "
+        f"{report.limit_pct:.1f} % of the air are taken"
     )
     if refused:
         said += f"; {refused} of {len(report.flows)} flows refused"
