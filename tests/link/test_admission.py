@@ -15,7 +15,7 @@ from sdrlinkd.link import (
     Told,
     TopicPolicy,
 )
-from sdrlinkd.link.schedule import Claim, admitted, planner_of, transmissions
+from sdrlinkd.link.schedule import Claim, TeamAir, admitted, planner_of, transmissions
 from sdrlinkd.wire import BROADCAST, Admit, Flows, ReservedFlow
 from tests.laws import law
 from tests.link.lossy import PDU_SIZE, Air
@@ -210,6 +210,36 @@ def test_a_robot_that_restarts_is_believed_at_once():
     assert all_agree(air) == {(2, 0): True}
     (flow,) = air.links[1].report(air.now).admission.flows
     assert flow.rate_hz == pytest.approx(300, rel=1e-3)
+
+
+def test_numbers_begin_anew_with_a_robot_that_restarts():
+    air = TeamAir(AdmissionParams(), 2, 200, lambda: 100, relays=False)
+    links = {1: {2: 1.0}, 2: {1: 1.0}}
+
+    def heard(*records):
+        for record in records:
+            air.take(1, record, 1.0)
+        air.look(1.0, [flow()], links, 1.0)
+        return {(each.src, each.flow.topic): each.is_admitted for each in air.flows()}
+
+    air.look(0.0, [flow()], links, 1.0)
+    assert heard(Flows(1, 500, (flow(3),)), Admit(1, 900, 2, b"\0")) == {(1, 3): None, (2, 0): True}
+    older = Flows(1, 499, (flow(4),)), Admit(1, 899, 2, b"", b"\0")
+    assert heard(*older) == {(1, 3): None, (2, 0): True}
+    air.newcomer(1, 1.0)
+    assert heard(*older) == {(1, 4): None, (2, 0): False}
+    assert heard(Flows(1, 500, ()), Admit(1, 900, 2, b"\0")) == {(2, 0): True}
+
+
+def test_an_earlier_life_of_ours_is_overtaken():
+    air = TeamAir(AdmissionParams(), 1, 200, lambda: 100, relays=False)
+    links = {1: {2: 1.0}, 2: {1: 1.0}}
+    air.look(0.0, [flow()], links, 1.0)
+    air.take(2, Flows(1, 4000, ()), 0.1)
+    air.take(2, Admit(1, 5000, 1, b"", b"\0"), 0.1)
+    air.look(0.2, [flow(), flow(1)], links, 1.0)
+    numbers = {type(each.record): each.record.number for each in air.told(0.2)}
+    assert numbers == {Flows: 4001, Admit: 5001}
 
 
 def test_refused_messages_have_a_name_and_urgent_ones_pass():

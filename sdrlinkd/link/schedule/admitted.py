@@ -45,9 +45,8 @@ def planner_of(edges: Edges, own_id: int) -> int:
 
     That is the lowest id heard by all, where somebody is heard by all.
     """
-    hops = {robot: dict.fromkeys(others, 1.0) for robot, others in edges.items()}
-    reached, _ = distances(hops, own_id)
-    return min(reached, key=lambda robot: (max(distances(hops, robot)[0].values()), robot))
+    reached = set().union(*_rings(edges, own_id))
+    return min(reached, key=lambda robot: (len(_rings(edges, robot)), robot))
 
 
 def transmissions(edges: Edges, src: int, dst: int) -> float:
@@ -68,3 +67,12 @@ def relays_of(edges: Edges, src: int, dst: int) -> list[int]:
     if dst != BROADCAST:
         return path(edges, src, dst)[1:-1]
     return sorted(robot for robot in tree(edges, src) if robot != src)
+
+
+def _rings(edges: Edges, robot: int) -> list[set[int]]:
+    """The robots by their hops from one of them, itself first."""
+    found, seen = [{robot}], {robot}
+    while ring := {other for each in found[-1] for other in edges.get(each, ())} - seen:
+        seen |= ring
+        found.append(ring)
+    return found

@@ -146,11 +146,9 @@ class TeamAir:
             self._edges = edges
             self._airs.clear()
             self._judged = None
-        planner = planner_of(self._edges, self._own_id)
-        if planner != self.planner:
-            self.planner, self._judged = planner, None
+            self.planner = planner_of(edges, self._own_id)
         self.limit = max(0.0, self._share * carried - CONTROL_SHARE)
-        if planner == self._own_id:
+        if self.planner == self._own_id:
             self._decide(verdicts, now, renews=renews)
         verdicts.expire(now)
 

@@ -12,6 +12,8 @@ from sdrlinkd.wire import (
     ALL_AIR,
     ENTRY_HEADER_SIZE,
     FLOW_AIR_UNIT,
+    MAX_FRAGMENTS,
+    PART_PARITY,
     STAMP_SIZE,
     ReservedFlow,
     octet,
@@ -48,7 +50,8 @@ class OwnFlows:
         mcs = min((rate.heard_there(each).mcs for each in to), default=rate.lowest)
         n_pdus = ceil((policy.max_bytes + STAMP_SIZE + ENTRY_HEADER_SIZE) / self._k)
         if n_pdus >= FEWEST_WITH_PARITY:
-            n_pdus += ceil(self._classes.of(qos).parity * n_pdus)
+            least = PART_PARITY if n_pdus > MAX_FRAGMENTS else 0.0
+            n_pdus += ceil(max(least, self._classes.of(qos).parity) * n_pdus)
         air = fit.message_s(mcs, n_pdus) / (policy.period_s * FLOW_AIR_UNIT)
         return ReservedFlow(
             topic, dst, qos, policy.priority, min(max(1, ceil(air)), ALL_AIR),
