@@ -15,8 +15,9 @@ from sdrlinkd.link import (
     Told,
     TopicPolicy,
 )
+from sdrlinkd.link.packing import PiggybackRecords
 from sdrlinkd.link.schedule import Claim, TeamAir, admitted, planner_of, transmissions
-from sdrlinkd.wire import BROADCAST, Admit, Flows, ReservedFlow
+from sdrlinkd.wire import BROADCAST, Admit, Beacon, Flows, RecordType, ReservedFlow
 from tests.laws import law
 from tests.link.lossy import PDU_SIZE, Air
 from tests.link.world import records_in, tell
@@ -294,6 +295,14 @@ def test_without_reserved_topics_not_an_octet_is_told():
     told = [record for robot in air.links for _, record in air.records(robot)]
     assert told
     assert not any(isinstance(record, Flows | Admit) for record in told)
+
+
+@pytest.mark.parametrize("kind", [RecordType.FLOWS, RecordType.ADMIT])
+def test_a_beacon_does_not_replace_them(kind):
+    waiting = PiggybackRecords()
+    waiting.put_as((kind, 1), Flows(1, 1) if kind == RecordType.FLOWS else Admit(1, 1, 1), 0.0)
+    waiting.offer([Beacon(1, 1)])
+    assert waiting.holds(kind)
 
 
 def test_records_alone_take_little_air():
