@@ -148,20 +148,35 @@ def test_over_two_hops_all_hear_the_same_word(loss):
     air = team(lost=lambda *_: rng.random() < loss)
     air.run(3.0)
     # To everyone over one relay: each takes twice its share.
-    reserve(air, 1, 0.15, "latency")
-    reserve(air, 3, 0.15, "default")
-    reserve(air, 2, 0.15, "bulk", topic=1)
+    reserve(air, 1, 0.12, "latency")
+    reserve(air, 3, 0.12, "default")
+    reserve(air, 2, 0.12, "bulk", topic=1)
     air.run(air.now + (3.0 if loss == 0.0 else 12.0))
     assert all_agree(air) == {(1, 0): True, (3, 0): True, (2, 1): True}
     reserve(air, 1, 0.2, "default", topic=1)
     air.run(air.now + (3.0 if loss == 0.0 else 12.0))
-    # 0.3 + 0.3 + 0.4 > 0.88, so the one that came last waits, and what is lower still fits.
+    # 0.24 + 0.24 + 0.4 + 0.12 > 0.88, and more with losses. So the one that came last waits, and what is lower still fits.
     assert all_agree(air) == {(1, 0): True, (3, 0): True, (2, 1): True, (1, 1): False}
     report = air.links[3].report(air.now).admission
     assert report.planner == 2
     assert report.limit_pct == pytest.approx(88.0)
     assert report.admitted_pct <= report.limit_pct
     assert [flow.via for flow in report.flows if flow.src == 1] == [[2], [2]]
+
+
+def test_noise_of_the_links_does_not_take_air_from_a_flow():
+    air = TeamAir(AdmissionParams(), 2, 200, lambda: 100, relays=True)
+
+    def word(cost):
+        air.look(
+            air_at.pop(0), [flow(air=13_000)._replace(dst=1)], {1: {2: 1.0}, 2: {1: cost}}, 1.0
+        )
+        (each,) = air.flows()
+        return each.air
+
+    air_at = [0.0, 1.0, 2.0, 3.0, 4.0]
+    costs = [word(cost) for cost in (1.5, 1.6, 1.3, 2.0, 2.1)]
+    assert costs == pytest.approx([13_000 / 32768 * cost for cost in (1.5, 1.5, 1.5, 2.0, 2.0)])
 
 
 def test_the_lowest_class_gives_way_and_comes_back():

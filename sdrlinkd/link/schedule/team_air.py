@@ -30,6 +30,8 @@ LOOK_S, RENEWED_S = 0.1, 5.0
 """Times in s between two looks at the flows, and until records are told anew."""
 CHANGED = 0.125
 """Relative change of a flow's air that is told."""
+STEADY = 0.25
+"""Relative change of a route's cost that is still taken for noise."""
 
 
 class TeamFlow(NamedTuple):
@@ -144,7 +146,7 @@ class TeamAir:
         verdicts = self._words()
         if edges != self._edges:
             self._edges = edges
-            self._airs.clear()
+            self._cost_anew()
             self._judged = None
             self.planner = planner_of(edges, self._own_id)
         self.limit = max(0.0, self._share * carried - CONTROL_SHARE)
@@ -259,6 +261,17 @@ class TeamAir:
         if ends not in self._airs:
             self._airs[ends] = transmissions(self._edges, src, flow.dst)
         return flow.air * FLOW_AIR_UNIT * self._airs[ends]
+
+    def _cost_anew(self) -> None:
+        """Take the costs of the routes anew, except those that have hardly changed.
+
+        So a flow does not lose its air to the noise of what is measured.
+        """
+        before, self._airs = self._airs, {}
+        for ends in {(src, flow.dst) for src, flow in self._table.flows()}:
+            cost = transmissions(self._edges, *ends)
+            known = before.get(ends, cost)
+            self._airs[ends] = known if abs(cost - known) <= STEADY * known else cost
 
     def _all_hear(self, teller: int) -> bool:
         """Whether all robots that we hear are known to hear the one that told something."""
