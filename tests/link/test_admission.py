@@ -155,7 +155,8 @@ def test_over_two_hops_all_hear_the_same_word(loss):
     assert all_agree(air) == {(1, 0): True, (3, 0): True, (2, 1): True}
     reserve(air, 1, 0.2, "default", topic=1)
     air.run(air.now + (3.0 if loss == 0.0 else 12.0))
-    # 0.24 + 0.24 + 0.4 + 0.12 > 0.88, and more with losses. So the one that came last waits, and what is lower still fits.
+    # 0.24 + 0.24 + 0.4 > 0.88, and more with losses: the one that came last waits, and what is
+    # lower still fits.
     assert all_agree(air) == {(1, 0): True, (3, 0): True, (2, 1): True, (1, 1): False}
     report = air.links[3].report(air.now).admission
     assert report.planner == 2
