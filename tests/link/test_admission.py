@@ -382,7 +382,7 @@ def test_flows_of_32_robots_are_held_at_most():
     air.run(air.now + 0.2)
     assert len(words(air, 1)) == 32
     # Nobody says them again.
-    air.run(air.now + 17.0)
+    air.run(air.now + 32.0)
     assert words(air, 1) == {}
 
 

@@ -6,7 +6,7 @@ from sdrlinkd.wire import ALL_AIR, BROADCAST, MOST_FLOWS, Flows, ReservedFlow, i
 
 MOST_ROBOTS = 32
 """Most robots of which flows are held."""
-GONE_S = 16.0
+GONE_S = 31.0
 """Time in s without a FLOWS record after which the flows of a robot are forgotten."""
 
 
