@@ -132,6 +132,7 @@ async def _open(
         classes=config.classes,
         relay=config.relay,
         repeat=config.repeat,
+        admission=config.admission,
         clock=config.clock,
         dictionaries=setup.dictionaries,
         hears_self=config.hears_self,

@@ -88,6 +88,11 @@ class Policies:
             new = msgspec.convert(merged, TopicPolicy)
         except msgspec.ValidationError:
             raise UserError(explain_policy(changes)) from None
+        if new.reserve and not (new.period_s and new.max_bytes):
+            raise UserError(
+                "reserve: got true; it needs period_s and max_bytes above 0: sdrlinkctl set "
+                f"{name} --reserve RATE:SIZE, such as 50:1KB"
+            )
         self.changed.setdefault(topic_id, {}).update({k: getattr(new, k) for k in changes})
         self._link.set_policy(topic_id, self._policy(topic_id))
         # Report the policy as the link has it, not as it was given.

@@ -293,6 +293,48 @@ class RoutesReport(msgspec.Struct, frozen=True, kw_only=True):
     """Robots that did not answer, and that nothing is sent through for some seconds."""
 
 
+class ReservedFlowReport(msgspec.Struct, frozen=True, kw_only=True):
+    """A flow of the team that air is reserved for."""
+
+    src: int
+    """Id of the robot that it is from."""
+    topic_id: int
+    """Topic id at that robot."""
+    name: str
+    """Name of the topic; empty if it is not known here."""
+    qos: str
+    """Class of its messages."""
+    priority: int
+    """Priority within the class."""
+    dst: int
+    """Id of the robot that it is for; 255: everyone."""
+    via: list[int]
+    """The robots that forward it."""
+    rate_hz: float
+    """Messages a second."""
+    size: int
+    """Largest size of a message in bytes."""
+    air_pct: float
+    """Airtime in % that it takes over its route."""
+    admitted: bool | None
+    """Whether it has air; null: the planner has not said anything of it yet."""
+
+
+class AdmissionReport(msgspec.Struct, frozen=True, kw_only=True):
+    """Air that flows reserve in the team (the key `reserve` of a topic)."""
+
+    planner: int | None = None
+    """Id of the robot that decides; null: nothing is reserved."""
+    limit_pct: float = 0.0
+    """Airtime in % up to which flows are admitted."""
+    admitted_pct: float = 0.0
+    """Airtime in % of all flows that are admitted."""
+    flows: list[ReservedFlowReport] = []
+    """The flows, in ascending order of robots and topic ids."""
+    records_ignored: int = 0
+    """FLOWS and ADMIT records that cannot be true, or that are not from the planner."""
+
+
 class SecurityReport(msgspec.Struct, frozen=True, kw_only=True):
     """Sealed PDUs: the keys, and the robots that have proven to be alive."""
 
@@ -384,6 +426,8 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """PDUs of other robots that this robot relays."""
     routes: RoutesReport = RoutesReport()
     """Links and paths of the team."""
+    admission: AdmissionReport = AdmissionReport()
+    """Air that flows of the team reserve."""
     repeats: RepeatReport = RepeatReport()
     """PDUs sent again, and asked for."""
     fragments_repaired: int = 0

@@ -62,7 +62,8 @@ ROWS = {
         *(
             f"{each}_{n}" for n in (8, 24)
             for each in (
-                "bound_broken", "longest_wait_over_bound", "urgent_in_outages_pct", "urgent_lost_pct",
+                "bound_broken", "longest_wait_over_bound", "urgent_in_outages_pct",
+                "urgent_lost_pct",
             )
         ),
         *(f"mobile_8_mdr_{qos}" for qos in ("urgent", "latency", "default")),

@@ -8,7 +8,8 @@ import msgspec
 import typer
 
 from sdrlinkd.adapters import open_bag
-from sdrlinkd.cli.app import AsJson, app
+from sdrlinkd.cli.app import AsJson, RuntimeDir, app
+from sdrlinkd.cli.team_plan import show_team
 from sdrlinkd.config import load_config, make_setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.plan import (
@@ -43,7 +44,9 @@ NOTHING = "no topics to plan; give --bag FILE, or topics with --topic NAME:RATE:
 
 @app.command()
 def plan(
-    config: Annotated[Path, typer.Option("--config", help="The daemon's configuration.")],
+    config: Annotated[
+        Path | None, typer.Option("--config", help="The daemon's configuration.")
+    ] = None,
     topic: Annotated[
         list[str] | None, typer.Option(help="NAME:RATE:SIZE, such as scan:50:1KB; repeatable.")
     ] = None,
@@ -62,12 +65,21 @@ def plan(
     host: Annotated[
         str, typer.Option(help="Latency of the hosts; `sdrlinkctl doctor` measures it.")
     ] = f"{1e3 * HOST_S:g}ms",
+    team: Annotated[
+        bool, typer.Option("--team", help="The flows of a running team that reserve air.")
+    ] = False,
+    runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
 ) -> None:
-    """Plan airtime and worst-case latency by topic, and the longest wait for the air by class.
+    """Plan airtime and worst-case latency by topic; exit code 1 when the traffic does not fit.
 
-    Exit code 1 when the traffic does not fit. Without topics, only the waits are printed.
+    Without topics, only the longest waits for the air are printed, by class.
     """
+    if team:
+        show_team(runtime_dir, config, as_json=as_json)
+        return
+    if config is None:
+        raise UserError("--config: missing; allowed: a configuration, or --team")
     setup = make_setup(load_config(config), config.parent, str(config))
     turnaround_s = None if turnaround is None else seconds(turnaround, "--turnaround")
     host_s, has_numbers = seconds(host, "--host"), setup.has_numbers

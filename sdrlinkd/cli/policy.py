@@ -7,6 +7,7 @@ import typer
 
 from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
 from sdrlinkd.cli.completion import one_of, robot_names, topic_names
+from sdrlinkd.cli.reserving import answer_of_team, asked_air, verdict_words
 from sdrlinkd.errors import UserError
 from sdrlinkd.units import octets, seconds
 
@@ -63,6 +64,13 @@ def set_policy(
     ] = None,
     queue_bytes: Annotated[Text, typer.Option(help="Most bytes queued; 0: no limit.")] = None,
     queue_s: Annotated[Text, typer.Option(help="Most airtime queued; 0: no limit.")] = None,
+    reserve: Annotated[
+        Text,
+        typer.Option(
+            help="Ask the team for air: RATE:SIZE, such as 50:1KB; none: give it back.",
+            autocompletion=one_of("none", "1:1KB", "10:1KB", "50:1KB"),
+        ),
+    ] = None,
     runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
 ) -> None:
@@ -84,19 +92,25 @@ def set_policy(
         "queue_bytes": None if queue_bytes is None else octets(queue_bytes, "--queue-bytes"),
         "queue_s": None if queue_s is None else seconds(queue_s, "--queue-s"),
     }
+    if reserve is not None:
+        given.update(asked_air(reserve))
     changes = {key: value for key, value in given.items() if value is not None}
     if not changes:
         raise UserError("nothing to change; name at least one: sdrlinkctl set --help")
     with connect(runtime_dir) as control:
         answer = control.ask("set", {"topic": topic, **changes})
+        verdict = answer_of_team(control, answer["topic"]) if changes.get("reserve") else None
     if as_json:
-        typer.echo(msgspec.json.encode(answer).decode())
+        told = answer if verdict is None else {**answer, "team": verdict}
+        typer.echo(msgspec.json.encode(told).decode())
         return
     typer.echo(f"{answer['topic']}:")
     for key in changes:
         typer.echo(
             f"  {key}: {_shown(key, answer['old'][key])} -> {_shown(key, answer['new'][key])}"
         )
+    if verdict is not None:
+        typer.echo(verdict_words(verdict))
 
 
 @app.command()

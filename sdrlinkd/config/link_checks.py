@@ -40,6 +40,28 @@ def check_relay(config: Config, registry: Registry) -> None:
             )
 
 
+def check_reserved(config: Config, named: Mapping[str, TopicPolicy], registry: Registry) -> None:
+    """Check that what topics reserve can be reserved.
+
+    Raises ConfigError, which begins with the key and says what was given and what is allowed.
+    """
+    for name, policy in named.items():
+        if not policy.reserve:
+            continue
+        key = f"topic.{name}.reserve: got true; it needs"
+        if not (policy.period_s and policy.max_bytes):
+            raise ConfigError(
+                f"{key} period_s and max_bytes above 0, which say how often and how much; allowed "
+                "without: false"
+            )
+        if not registry.has_control:
+            raise ConfigError(
+                f"{key} the control channel, so at most 15 topics; allowed here: false"
+            )
+        if not config.admission.share:
+            raise ConfigError(f"{key} admission.share above 0; allowed with 0: false")
+
+
 def check_security(config: Config, registry: Registry) -> None:
     """Check that PDUs can be sealed, if they should be.
 

@@ -24,6 +24,7 @@ from sdrlinkd.config.pdu_links import (
 from sdrlinkd.config.radios import GnuRadioParams
 from sdrlinkd.link import (
     AccessParams,
+    AdmissionParams,
     ClassesParams,
     ClockParams,
     LinkParams,
@@ -98,6 +99,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     classes: ClassesParams = ClassesParams()
     relay: RelayParams = RelayParams()
     repeat: RepeatParams = RepeatParams()
+    admission: AdmissionParams = AdmissionParams()
     security: SecurityParams = SecurityParams()
     clock: ClockParams = ClockParams()
     chrony: ChronyParams = ChronyParams()

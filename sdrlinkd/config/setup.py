@@ -6,7 +6,12 @@ from pathlib import Path
 
 from zstandard import ZstdCompressionDict
 
-from sdrlinkd.config.link_checks import check_relay, check_security, load_dictionaries
+from sdrlinkd.config.link_checks import (
+    check_relay,
+    check_reserved,
+    check_security,
+    load_dictionaries,
+)
 from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
 from sdrlinkd.config.pdu_link_checks import check_pdu_link, with_paths
@@ -165,6 +170,7 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
             "whose clock is the reference"
         )
     named = policies_by_name(config, registry, has_numbers)
+    check_reserved(config, named, registry)
     if has_numbers:
         named = with_commands(named, node_id)
     policies = {topic.id: named[topic.name] for topic in registry.topics if topic.name in named}

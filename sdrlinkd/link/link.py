@@ -1,6 +1,6 @@
 """The link: all traffic of one node, computed from bytes and `now`, without waiting or I/O."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from math import inf
 from random import Random
 
@@ -11,6 +11,7 @@ from sdrlinkd.errors import ConfigError
 from sdrlinkd.link.access import LEAST_BID_ROOM, LEAST_ROOM, AccessParams
 from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
+from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos
 from sdrlinkd.link.queue import (
     DEFAULT_POLICY,
@@ -40,8 +41,8 @@ from sdrlinkd.link.receive import (
 from sdrlinkd.link.repeat import Answers, Asking, RepeatParams
 from sdrlinkd.link.report import NO_NAMES, Names, Reporter
 from sdrlinkd.link.routes import Again, PduToRelay, RelayParams, Routes
-from sdrlinkd.link.schedule import ClassesParams, Flow, Forecasts
-from sdrlinkd.link.status import AirUse, Told, Why
+from sdrlinkd.link.schedule import AdmissionParams, ClassesParams, Flow, Forecasts, TeamAir
+from sdrlinkd.link.status import AirUse, Told, Why, reserved_words
 from sdrlinkd.link.timesync import ClockParams, Clocks, Estimate, State, Wall
 from sdrlinkd.link.topics import (
     Demand,
@@ -61,6 +62,7 @@ from sdrlinkd.link.transmit import (
     Fit,
     NoRadio,
     Outcome,
+    OwnFlows,
     RateParams,
     TxDelayMeters,
     fit_to,
@@ -74,7 +76,9 @@ from sdrlinkd.wire import (
     TLV_HEADER_SIZE,
     TOPIC_OVERHEAD,
     WANTED_OVERHEAD,
+    Admit,
     Clock,
+    Flows,
     Lsa,
     Need,
     Receipt,
@@ -86,10 +90,12 @@ from sdrlinkd.wire import (
     Wanted,
     equal_payload,
     needs,
+    octet,
 )
 
 NO_DICTIONARIES: Mapping[int, ZstdCompressionDict] = {}
 NO_RELAY = RelayParams()
+DEFAULT_ADMISSION = AdmissionParams()
 NO_CLOCK = ClockParams(period_s=0.0)
 NO_REPEAT = RepeatParams(share=0.0)
 DEFAULT_CLASSES = ClassesParams()
@@ -120,6 +126,7 @@ class Link:
         relay: RelayParams = NO_RELAY,
         clock: ClockParams = NO_CLOCK,
         repeat: RepeatParams = NO_REPEAT,
+        admission: AdmissionParams = DEFAULT_ADMISSION,
         dictionaries: Mapping[int, ZstdCompressionDict] = NO_DICTIONARIES,
         hears_self: bool = False,
         has_numbers: bool = False,
@@ -169,6 +176,11 @@ class Link:
             params, reassembly, registry, self._heard_topics, own_id, self._routes,
             Inflated(dictionaries), max_expanded, hears_self, self.sealing, clear_size,
         )  # fmt: skip
+        self._team_air = TeamAir(
+            admission if has_control else AdmissionParams(share=0.0), own_id,
+            self._composer.k_single, lambda: rng.randrange(1 << 16), relays=self._routes.is_auto,
+        )  # fmt: skip
+        self._own_flows = OwnFlows(self._topics, self._intake, classes, self._composer.k_single)
         self._team: frozenset[int] = frozenset()
         """The robots that the configuration names."""
         self._own_begins = self._reception.own_pdus.begins
@@ -191,13 +203,14 @@ class Link:
             self._asking, self._routes, self._composer.k_single, own_id, clear_size,
         )  # fmt: skip
         self._forecasts = Forecasts()
+        self._fit: Fit | None = None
         self._scheduler: BurstScheduler | NoRadio = NoRadio()
         self._why = Why(self._intake, self._outbox)
         self._reporter = Reporter(
             self._topics, self._heard_topics, digest, self._outbox, self._intake,
             self._composer, self._control_records, self._tx_delays, self._reception, self._receipts,
-            self._clocks, self.sealing, self._asking, self._answers, self._routes, own_id,
-            clear_size,
+            self._clocks, self.sealing, self._asking, self._answers, self._routes,
+            self._team_air, own_id, clear_size,
         )  # fmt: skip
 
     # The radio.
@@ -228,6 +241,7 @@ class Link:
         `attach` derives `fit` from the radio's traits; callers may pass one with an access policy
         of their own.
         """
+        self._fit = fit
         if isinstance(self._scheduler, NoRadio):
             self._scheduler = BurstScheduler(
                 fit, self._outbox, self._composer, self._control_records, self._tx_delays,
@@ -246,6 +260,7 @@ class Link:
             self._answers.restart()
             self._asking.restart()
             self._routes.begin_anew()
+            self._team_air.begin_anew()
             self._reception.begin_anew()
         self.sealing.opener.set_uncertainty(fit.stamp_s)
         self._clocks.set_resolution(fit.stamp_s)
@@ -303,7 +318,11 @@ class Link:
     ) -> str | None:
         """Queue a message; returns None, or the ledger's reason for refusing it."""
         intake, bytes_per_s = self._intake, self._scheduler.bytes_per_s
-        refused = intake.submit(topic_id, payload, now, overrides, bytes_per_s)
+        is_urgent = overrides.qos is Qos.URGENT
+        is_admitted = is_urgent or not self._team_air.is_refused(octet(topic_id))
+        refused = intake.submit(
+            topic_id, payload, now, overrides, bytes_per_s, is_admitted=is_admitted
+        )
         if overrides.receipt:
             self._tell_dropped()
             if refused in NOT_TAKEN or (refused and not self.registry.has_control):
@@ -465,6 +484,7 @@ class Link:
         self._tell_routes(now)
         self._control_records.look_round(now, scheduler.record_pdu_s)
         self._control_records.tell_topics(now, scheduler.record_pdu_s)
+        self._look_at_air(now)
         self._tell_dropped()
         self._receipts.expire(now)
         self._why.sample(now, (each.id for each in self._topics), self._air_use)
@@ -502,7 +522,9 @@ class Link:
     def why(self, topic_id: int, told: Told, now: float) -> list[str]:
         """What happens to a topic's messages and why, in plain sentences."""
         name = self._topics[topic_id].name
-        return self._why.explain(topic_id, name, told, now, self._air_use())
+        lines = self._why.explain(topic_id, name, told, now, self._air_use())
+        report = self._reporter.reserved()
+        return [*lines, *reserved_words(self.own_id, octet(topic_id), report)]
 
     def report(self, now: float, names: Names = NO_NAMES) -> LinkReport:
         """Everything the link knows, at `now`."""
@@ -549,6 +571,7 @@ class Link:
                     self._asking.forget(event.src)
                     self._answers.restarted(event.src)
                     self._routes.newcomer(event.src, event.at)
+                    self._team_air.newcomer(event.src, event.at)
                     # The new robot lacks the messages latched before.
                     self._latched.newcomer(event.src, event.at)
                     self._control_records.newcomer(event.at)
@@ -581,6 +604,8 @@ class Link:
             n_others = len(self._reception.neighbors.present(at))
             self._answers.needed(src, record, at, n_others)
             self._scheduler.more_to_send()
+        elif isinstance(record, Flows | Admit):
+            self._team_air.take(src, record, at)
         elif not isinstance(record, Lsa | Route):
             self._scheduler.record_heard(src, record, at)
         if isinstance(record, Need | Lsa | Route):
@@ -622,6 +647,25 @@ class Link:
         if self._routes.has_news:
             self._control_records.tell_routes(now, self._scheduler.record_pdu_s)
             self._scheduler.more_to_send()
+
+    def _look_at_air(self, now: float) -> None:
+        """Ask for the air that flows reserve, and decide who gets it, as far as that is due."""
+        air, fit = self._team_air, self._fit
+        if fit is not None and air.is_due(now):
+            heard = self._reception.neighbors.present(now)
+            wanted = self._own_flows.wanted(fit, heard)
+            air.look(now, wanted, self._known_links(heard), fit.settled.share)
+        if air.has_news(now):
+            records = air.told(now)
+            self._control_records.tell_air(records, now, self._scheduler.record_pdu_s)
+            self._scheduler.more_to_send()
+
+    def _known_links(self, heard: Sequence[int]) -> Edges:
+        """The links of the team; where nobody tells them, all robots hear each other."""
+        if self._routes.is_auto:
+            return self._routes.edges
+        team = {self.own_id, *heard}
+        return {robot: dict.fromkeys(team - {robot}, 1.0) for robot in team}
 
     def _refused(self, receipt: str, topic_id: int, reason: str, dst: int | None) -> None:
         dst = self._intake.destination(topic_id) if dst is None else dst

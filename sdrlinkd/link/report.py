@@ -12,7 +12,8 @@ from sdrlinkd.link.receipts import Receipts
 from sdrlinkd.link.receive import Reception
 from sdrlinkd.link.repeat import Answers, Asking
 from sdrlinkd.link.routes import Routes
-from sdrlinkd.link.status import RateMeter
+from sdrlinkd.link.schedule import TeamAir
+from sdrlinkd.link.status import RateMeter, admission_report, refused_notices
 from sdrlinkd.link.timesync import Clocks
 from sdrlinkd.link.topics import HeardTopics, OwnTopics
 from sdrlinkd.link.transmit import (
@@ -24,6 +25,7 @@ from sdrlinkd.link.transmit import (
 )
 from sdrlinkd.reports import (
     RATE_WINDOW_S,
+    AdmissionReport,
     LinkReport,
     NeighborReport,
     ReceivedTopicReport,
@@ -31,7 +33,7 @@ from sdrlinkd.reports import (
     TxReport,
 )
 from sdrlinkd.sealing import InTheClear, Sealing
-from sdrlinkd.wire import RegistryDigest
+from sdrlinkd.wire import FIRST_NUMBER, RegistryDigest, octet
 
 Scheduler = BurstScheduler | NoRadio
 
@@ -56,12 +58,13 @@ class Reporter:
         digest: RegistryDigest, outbox: Outbox, intake: Intake, composer: Composer,
         control_records: ControlRecords, tx_delays: TxDelayMeters, reception: Reception,
         receipts: Receipts, clocks: Clocks, sealing: Sealing | InTheClear, asking: Asking,
-        answers: Answers, routes: Routes, own_id: int, pdu_size: int,
+        answers: Answers, routes: Routes, team_air: TeamAir, own_id: int, pdu_size: int,
     ) -> None:  # fmt: skip
         self._own_id = own_id
         self._asking = asking
         self._answers = answers
         self._routes = routes
+        self._team_air = team_air
         self._sealing = sealing
         self._pdu_size = pdu_size
         self._own = topics
@@ -107,6 +110,7 @@ class Reporter:
             security=self._sealing.report(now),
             relayed=self._intake.report_relayed(),
             routes=self._routes.report(now),
+            admission=self.reserved(),
             repeats=self._asking.report(self._answers.report()),
             fragments_repaired=self._reception.fragments_repaired,
             receipts_untold=records.receipts_untold,
@@ -142,6 +146,7 @@ class Reporter:
             for topic_id in self._composer.report().starved
         ]
         notices += self._never_met(scheduler.least_s) + scheduler.access_notices(now)
+        notices += refused_notices(self._own_id, self.reserved())
         notices += self._heard_topics.notices()
         notices += self._sealing.notices(now)
         if self._reception.own_pdus.has_double(now):
@@ -150,6 +155,19 @@ class Reporter:
                 "give each robot an id of its own (robot_id)"
             )
         return notices + self._neighbors.disagreements(self._registry, self._digest)
+
+    def reserved(self) -> AdmissionReport:
+        """The flows of the team that reserve air, and what became of them."""
+        return admission_report(self._team_air, self._named)
+
+    def _named(self, src: int, topic: int) -> str:
+        """The name of a topic of a robot, as far as it is known here."""
+        if src == self._own_id:
+            return next((each.name for each in self._own if octet(each.id) == topic), "")
+        if topic < FIRST_NUMBER:
+            return next((each.name for each in self._registry.topics if each.id == topic), "")
+        heard = self._heard_topics.topic(src, topic)
+        return "" if heard is None else heard.name
 
     def _never_met(self, least_s: float) -> list[str]:
         """Sentences on topics with a lifespan below `least_s`, the shortest possible latency."""

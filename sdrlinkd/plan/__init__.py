@@ -4,6 +4,7 @@ from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.bounds import AccessBound, access_bounds
 from sdrlinkd.plan.model import ClassPlan, Plan, TopicPlan, make_plan
 from sdrlinkd.plan.setting import HOST_S, MOST_ROBOTS, bounds_of, setting_of
+from sdrlinkd.plan.team import team_worst_s
 from sdrlinkd.plan.traffic import (
     LeftOut,
     Load,
@@ -30,5 +31,6 @@ __all__ = [
     "names_in",
     "parse_load",
     "setting_of",
+    "team_worst_s",
     "with_declared",
 ]

@@ -56,6 +56,16 @@ from sdrlinkd.wire.repeat import (
     parse_need,
     parse_repeat,
 )
+from sdrlinkd.wire.reserving import (
+    ADMIT_OVERHEAD,
+    FLOWS_OVERHEAD,
+    Admit,
+    Flows,
+    build_admit,
+    build_flows,
+    parse_admit,
+    parse_flows,
+)
 from sdrlinkd.wire.routing import (
     LSA_OVERHEAD,
     ROUTE_OVERHEAD,
@@ -93,6 +103,8 @@ Record = (
     | Bare
     | Want
     | Grant
+    | Flows
+    | Admit
 )
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
@@ -143,6 +155,8 @@ _LEAST = {
     int(RecordType.ROUTE): ROUTE_OVERHEAD - TLV_HEADER_SIZE,
     int(RecordType.WANT): WANT_SIZE - TLV_HEADER_SIZE,
     int(RecordType.GRANT): GRANT_OVERHEAD - TLV_HEADER_SIZE,
+    int(RecordType.FLOWS): FLOWS_OVERHEAD - TLV_HEADER_SIZE,
+    int(RecordType.ADMIT): ADMIT_OVERHEAD - TLV_HEADER_SIZE,
 }
 
 
@@ -163,6 +177,8 @@ _READERS: dict[int, Callable[[bytes], Record]] = {
     RecordType.ROUTE: parse_route,
     RecordType.WANT: parse_want,
     RecordType.GRANT: parse_grant,
+    RecordType.FLOWS: parse_flows,
+    RecordType.ADMIT: parse_admit,
 }
 """Readers of the values of records without fixed fields, by type number."""
 
@@ -248,6 +264,8 @@ _BUILDERS: dict[type[Record], tuple[RecordType, Callable[[Any], bytes]]] = {
     Route: (RecordType.ROUTE, build_route),
     Want: (RecordType.WANT, build_want),
     Grant: (RecordType.GRANT, build_grant),
+    Flows: (RecordType.FLOWS, build_flows),
+    Admit: (RecordType.ADMIT, build_admit),
 }
 
 

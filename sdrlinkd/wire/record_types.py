@@ -31,6 +31,8 @@ class RecordType(IntEnum):
     CONTACT = 19
     KEY = 20
     BARE = 21
+    FLOWS = 22
+    ADMIT = 23
 
 
 class Stamp(NamedTuple):

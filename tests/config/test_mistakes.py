@@ -35,6 +35,12 @@ MISTAKES = [
     ("[topic.odom]\nprio = 3", 2, ["topic.odom.prio: unknown key; did you mean priority"]),
     ('[topic.odom]\nlifespan_s = "0.3 parsec"', 2, ["topic.odom.lifespan_s", '"300 ms"']),
     ('[topic.odom]\nlifespan_s = "soon"', 2, ['got "soon"', "with a unit"]),
+    ("[topic.odom]\nreserve = true", 2, ["topic.odom.reserve", "period_s and max_bytes"]),
+    (
+        "[admission]\nshare = 0\n[topic.odom]\nreserve = true\nperiod_s = 1\nmax_bytes = 9", 4,
+        ["topic.odom.reserve", "admission.share above 0"],
+    ),
+    ("[admission]\nshare = 1.1", 2, ["admission.share: got 1.1", "from 0 to 1"]),
     ("[topic.odom]\ndepth = -1", 2, ["topic.odom.depth: got -1"]),
     (
         '[topic.odom]\ncompress = "zstd"\ndictionary = "none.zdict"', 3,

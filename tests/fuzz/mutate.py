@@ -7,11 +7,13 @@ from random import Random
 from sdrlinkd.sealing import Remembered, Sealing, SecurityParams
 from sdrlinkd.wire import (
     SEAL_OVERHEAD,
+    Admit,
     Arrival,
     Bare,
     Beacon,
     Clock,
     Contact,
+    Flows,
     Frame,
     Grant,
     KeyTold,
@@ -23,6 +25,7 @@ from sdrlinkd.wire import (
     Receipt,
     RegistryDigest,
     Repeat,
+    ReservedFlow,
     Route,
     Stamp,
     TopicPiece,
@@ -36,7 +39,7 @@ from tests.fuzz.targets import KEY, PDU_SIZE
 
 EDGES = (0, 1, 2, 3, 4, 5, 6, 13, 14, 15, 16, 17, 127, 128, 254, 255)
 WORDS = ("0", "-1", "1e999", "nan", '""', "[]", "{}", "true", "9" * 30, '"9 GHz"', "0x7f", "null")
-KINDS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 17, 18, 19, 20, 21, 22, 99)
+KINDS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 17, 18, 19, 20, 21, 22, 23, 24, 99)
 RECORDS = (
     Stamp(1, 2, 3), Stamp(1, 2, 3, asks=True), Beacon(1, 2), Beacon(1, 2, 3),
     RegistryDigest(bytes(8), b"abc"), LinkReport(2, -3, 4, 5), Receipt(1, 2, 1),
@@ -47,6 +50,8 @@ RECORDS = (
     Contact(bytes(8), (Met(2, bytes(4), 3),)), KeyTold(1, False, bytes(4)),
     Lsa(1, 7, ((2, 3), (3, 16))), Lsa(255, 0x1234), Route(2, 255, 300, b"\1\3"), Bare(44, b"\xa1"),
     Want(1, 0, 64, 3, 40, 50), Grant(7, 1, 900, ((1, 9), (5, 0), (255, 3))),
+    Flows(1, 7, (ReservedFlow(0, 255, 3, 64, 300, 20_000, 900),)), Flows(2, 8),
+    Admit(1, 9, 2, b"\0", b"\1"),
 )  # fmt: skip
 BUILT = [build_records([record]) for record in RECORDS]
 

@@ -9,6 +9,7 @@ import msgspec
 from sdrlinkd.link import (
     QOS_BY_LABEL,
     AccessParams,
+    AdmissionParams,
     ClassesParams,
     ClockParams,
     Link,
@@ -60,6 +61,8 @@ def make_link(
     clock=None,
     repeat=None,
     has_numbers=False,
+    admission=None,
+    traits=None,
     **params,
 ):
     """A link on its own air; `params` are LinkParams. No beacons unless requested."""
@@ -77,8 +80,9 @@ def make_link(
         clock=clock or ClockParams(period_s=0.0),
         repeat=repeat or RepeatParams(share=0.0),
         has_numbers=has_numbers,
+        admission=admission or AdmissionParams(),
     )
-    link.attach(PduLinkTraits(), AccessParams(), RateParams())
+    link.attach(traits or PduLinkTraits(), AccessParams(), RateParams())
     return link
 
 

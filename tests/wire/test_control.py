@@ -11,11 +11,13 @@ from sdrlinkd.wire import (
     MAX_AGE_US,
     MAX_ARRIVALS,
     NO_AGE,
+    Admit,
     Arrival,
     Bare,
     Beacon,
     Clock,
     Contact,
+    Flows,
     Frame,
     Grant,
     KeyTold,
@@ -27,6 +29,7 @@ from sdrlinkd.wire import (
     Receipt,
     RegistryDigest,
     Repeat,
+    ReservedFlow,
     Route,
     Stamp,
     TopicPiece,
@@ -64,12 +67,17 @@ NEED = {
     19: 8,
     20: 5,
     21: 2,
+    22: 3,
+    23: 5,
 }
 
 octet = st.integers(0, 255)
 u16 = st.integers(0, 0xFFFF)
 u32 = st.integers(0, (1 << 32) - 1)
 i31 = st.integers(-(1 << 31) + 1, (1 << 31) - 1)
+RESERVED = st.builds(
+    ReservedFlow, octet, octet, st.integers(0, 3), st.integers(0, 127), u16, u32, u32
+)
 records = st.one_of(
     st.builds(Stamp, octet, octet, st.integers(0, MAX_AGE_US), st.booleans()),
     st.builds(Waits, octet, octet, octet, octet),
@@ -106,6 +114,8 @@ records = st.one_of(
         Want, octet, st.integers(0, 3), st.integers(0, 127), st.integers(0, 127), octet, octet
     ),
     st.builds(Grant, octet, octet, u32, st.lists(st.tuples(octet, octet), max_size=124).map(tuple)),
+    st.builds(Flows, octet, u16, st.lists(RESERVED, max_size=18).map(tuple)),
+    st.builds(Admit, octet, u16, octet, st.binary(max_size=125), st.binary(max_size=125)),
     st.builds(Lsa, octet, u16, st.lists(st.tuples(octet, octet), max_size=126).map(tuple)),
     st.builds(Route, octet, octet, u32, st.binary(max_size=249)),
     st.builds(Repeat, octet, u32, u16, octet),
@@ -154,7 +164,7 @@ def test_unknown_types_are_skipped(pairs, last):
     assert parse_records(payload) == [record for _, record in pairs]
 
 
-@pytest.mark.parametrize("kind", [0, 16, 22, 255])
+@pytest.mark.parametrize("kind", [0, 16, 24, 255])
 def test_reserved_types_are_skipped(kind):
     assert parse_records(bytes([kind, 2, 1, 6, 5, 3, 1, 2, 3])) == [Receipt(1, 2, 3)]
 
@@ -284,6 +294,18 @@ def test_any_bytes_are_records_or_refused():
         Grant(0, 0, -1),
         Grant(0, 0, 0, ((256, 0),)),
         Grant(0, 0, 0, ((0, 0),) * 125),
+        Flows(256, 0),
+        Flows(0, 1 << 16),
+        Flows(0, 0, (ReservedFlow(256, 0, 0, 0, 0, 0, 0),)),
+        Flows(0, 0, (ReservedFlow(0, 0, 4, 0, 0, 0, 0),)),
+        Flows(0, 0, (ReservedFlow(0, 0, 0, 128, 0, 0, 0),)),
+        Flows(0, 0, (ReservedFlow(0, 0, 0, 0, 1 << 16, 0, 0),)),
+        Flows(0, 0, (ReservedFlow(0, 0, 0, 0, 0, 1 << 32, 0),)),
+        Flows(0, 0, (ReservedFlow(0, 0, 0, 0, 0, 0, 0),) * 19),
+        Admit(256, 0, 0),
+        Admit(0, 1 << 16, 0),
+        Admit(0, 0, 256),
+        Admit(0, 0, 0, bytes(200), bytes(60)),
         Lsa(256, 0),
         Lsa(0, 1 << 16),
         Lsa(0, 0, ((256, 0),)),

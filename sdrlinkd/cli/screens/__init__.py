@@ -13,6 +13,7 @@ from sdrlinkd.cli.screens.latency import latency_screen
 from sdrlinkd.cli.screens.routes import routes_screen
 from sdrlinkd.cli.screens.rows import failed, is_idle, robots_table
 from sdrlinkd.cli.screens.status import StatusScreen, verdict
+from sdrlinkd.cli.screens.team import team_screen
 
 __all__ = [
     "StatusScreen",
@@ -28,5 +29,6 @@ __all__ = [
     "robots_table",
     "routes_screen",
     "sparkline",
+    "team_screen",
     "verdict",
 ]

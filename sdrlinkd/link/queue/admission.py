@@ -2,7 +2,9 @@
 
 from sdrlinkd.link.queue.policy import TopicPolicy
 
-NOT_TAKEN = frozenset({"tx_size_cap", "tx_unchanged", "tx_decimated", "tx_throttled", "tx_too_big"})
+NOT_TAKEN = frozenset({
+    "tx_size_cap", "tx_unchanged", "tx_decimated", "tx_throttled", "tx_too_big", "tx_not_admitted",
+})  # fmt: skip
 """Reasons under which a message is refused before it enters the queue."""
 
 

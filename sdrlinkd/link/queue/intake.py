@@ -87,11 +87,16 @@ class Intake:
         now: float,
         overrides: Overrides = AS_CONFIGURED,
         bytes_per_s: float = inf,
+        *,
+        is_admitted: bool = True,
     ) -> str | None:
-        """Queue a message; returns None, or the ledger's reason for refusing it."""
+        """Queue a message; returns None, or the ledger's reason for refusing it.
+
+        `is_admitted`: the team has air for it.
+        """
         topic = self._topics[topic_id]
         topic.tally.accept(len(payload))
-        refused = topic.admission.refuse(payload, now)
+        refused = topic.admission.refuse(payload, now) if is_admitted else "tx_not_admitted"
         if refused:
             topic.tally.drop(refused)
             return refused

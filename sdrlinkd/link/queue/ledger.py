@@ -11,6 +11,7 @@ TX_REASONS = {
     "tx_too_big": "larger than PDUs of this size can carry",
     "tx_size_cap": "larger than the topic's max_bytes",
     "tx_throttled": "faster than the topic's period",
+    "tx_not_admitted": "the team's air is full, and the topic's flow was refused (reserve)",
     "tx_decimated": "decimated: the topic sends one message in several",
     "tx_unchanged": "same content as the last message, and the topic sends only changes",
     "tx_filtered": "none of its frames are selected ([tf])",

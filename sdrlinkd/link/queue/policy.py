@@ -59,6 +59,9 @@ class TopicPolicy(
     """Whether to send each message's age, so that the receiver knows how late it is."""
     period_s: Annotated[float, Meta(ge=0, le=3600)] = 0.0
     """Shortest time in s between two messages sent; 0: no throttle."""
+    reserve: bool = False
+    """Whether to reserve the team's air for a message of `max_bytes` every `period_s`, which are
+    both needed. While the team has no air for it, the topic's messages are dropped."""
     decimate: Annotated[int, Meta(ge=1)] = 1
     """Send one message in this many."""
     on_change: bool = False

@@ -156,6 +156,11 @@ class Routes:
         return self._links.edges
 
     @property
+    def edges(self) -> Edges:
+        """The links of the team."""
+        return self._links.edges
+
+    @property
     def has_news(self) -> bool:
         """Whether `told` would return records."""
         return bool(self._links.news or self._owed) or self._forwarding.has_news

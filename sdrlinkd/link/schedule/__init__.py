@@ -1,10 +1,11 @@
 """Decides how long the next burst may be, and whether it should wait.
 
 This package holds the forecasts of messages that are due, the caps and shares of the classes and
-their credit, and budgets of airtime. It knows neither queue nor radio; their state is passed in as
-arguments.
+their credit, budgets of airtime, and the flows of the team that air is reserved for. It knows
+neither queue nor radio; their state is passed in as arguments.
 """
 
+from sdrlinkd.link.schedule.admitted import Claim, admitted, planner_of, transmissions
 from sdrlinkd.link.schedule.allowance import (
     IDLE_SHARE,
     OVERRUN,
@@ -15,6 +16,7 @@ from sdrlinkd.link.schedule.allowance import (
 from sdrlinkd.link.schedule.budget import Budget
 from sdrlinkd.link.schedule.forecast import Flow, Forecasts
 from sdrlinkd.link.schedule.params import (
+    AdmissionParams,
     BulkParams,
     ClassesParams,
     ClassParams,
@@ -23,14 +25,17 @@ from sdrlinkd.link.schedule.params import (
     UrgentParams,
 )
 from sdrlinkd.link.schedule.shares import Shares
+from sdrlinkd.link.schedule.team_air import TeamAir, TeamFlow, ToldOfAir
 
 __all__ = [
     "IDLE_SHARE",
     "OVERRUN",
     "SHARED_OVERRUN",
+    "AdmissionParams",
     "Allowance",
     "Budget",
     "BulkParams",
+    "Claim",
     "ClassParams",
     "ClassesParams",
     "DefaultParams",
@@ -39,5 +44,11 @@ __all__ = [
     "LatencyParams",
     "Limits",
     "Shares",
+    "TeamAir",
+    "TeamFlow",
+    "ToldOfAir",
     "UrgentParams",
+    "admitted",
+    "planner_of",
+    "transmissions",
 ]

@@ -1,4 +1,4 @@
-"""Settings of the traffic classes."""
+"""Settings of the traffic classes, and of air that is reserved."""
 
 from typing import Annotated
 
@@ -67,3 +67,11 @@ class ClassesParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         """The settings of one class."""
         params: ClassParams = getattr(self, qos.label)
         return params
+
+
+class AdmissionParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Air that topics reserve in the whole team (the key `reserve` of a topic)."""
+
+    share: Annotated[float, Meta(ge=0, le=1)] = 0.9
+    """Share of the air that the access policy leaves, up to which flows are admitted, all robots
+    together; the same at all of them. 0: nothing is reserved."""

@@ -4,6 +4,11 @@ This package keeps samples of counters. It counts nothing itself and takes no de
 """
 
 from sdrlinkd.link.status.meters import RateMeter
+from sdrlinkd.link.status.reserved import (
+    admission_report,
+    refused_notices,
+    reserved_words,
+)
 from sdrlinkd.link.status.why import AirUse, Told, Why
 
 __all__ = [
@@ -11,4 +16,7 @@ __all__ = [
     "RateMeter",
     "Told",
     "Why",
+    "admission_report",
+    "refused_notices",
+    "reserved_words",
 ]

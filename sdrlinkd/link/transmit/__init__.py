@@ -9,6 +9,7 @@ from sdrlinkd.link.transmit.burst import Burst, Outcome
 from sdrlinkd.link.transmit.control_records import MOST_RECEIPTS, ControlRecords
 from sdrlinkd.link.transmit.fit import Fit, fit_to
 from sdrlinkd.link.transmit.no_radio import NoRadio
+from sdrlinkd.link.transmit.own_flows import OwnFlows
 from sdrlinkd.link.transmit.rate import (
     HIGH_PER,
     KEPT_CHANGES,
@@ -41,6 +42,7 @@ __all__ = [
     "Fit",
     "NoRadio",
     "Outcome",
+    "OwnFlows",
     "RateChange",
     "RateControl",
     "RateParams",

@@ -2,15 +2,16 @@
 
 It handles several kinds of records: beacons (with digest, link reports and WAITS), the schedule of
 the access policy (FRAME), clocks (CLOCK), RECEIPTs, declarations (TOPIC), what consumers here
-subscribe to (WANTED), the PDUs that we lack (NEED), links and routes (LSA, ROUTE), and the proof
-that we are alive (CONTACT). Each record is made when it is due, uses spare room in a broadcast PDU,
-and from a certain time on gets its own PDU. Such a PDU takes airtime from messages, and a half-
-duplex radio is deaf while it sends. So PDUs that hold only records take at most `clock.share` of
-the airtime, all robots together: with n robots, each sends at most one such PDU every n · pdu_s /
-share. This limits beacons, too, unless rate control or a schedule depends on them. Declarations,
-questions and routes have shares of their own.
+subscribe to (WANTED), the PDUs that we lack (NEED), links and routes (LSA, ROUTE), flows that
+reserve air (FLOWS, ADMIT), and the proof that we are alive (CONTACT). Each record is made when it
+is due, uses spare room in a broadcast PDU, and from a certain time on gets its own PDU. Such a PDU
+takes airtime from messages, and a half-duplex radio is deaf while it sends. So PDUs that hold only
+records take at most `clock.share` of the airtime, all robots together: with n robots, each sends at
+most one such PDU every n · pdu_s / share. This limits beacons, too, unless rate control or a
+schedule depends on them. Declarations, questions, routes and flows have shares of their own.
 """
 
+from collections.abc import Iterable
 from math import inf
 
 from sdrlinkd.link.packing import BuiltPdu, PiggybackRecords
@@ -18,7 +19,7 @@ from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.receive import Neighbors
 from sdrlinkd.link.repeat import Asking
 from sdrlinkd.link.routes import Routes
-from sdrlinkd.link.schedule import Budget
+from sdrlinkd.link.schedule import Budget, ToldOfAir
 from sdrlinkd.link.timesync import ClockParams, Clocks
 from sdrlinkd.link.topics import TopicTeller, Wants
 from sdrlinkd.link.transmit.beacons import Beacons
@@ -44,8 +45,9 @@ from sdrlinkd.wire import (
 PATIENCE_S = 0.05
 """Shortest time in s that a RECEIPT or a WANTED waits for spare room."""
 MOST_RECEIPTS = 256
-ROUTES_SHARE = 0.02
-"""Largest share of the airtime for PDUs with nothing but LSA, ROUTE, and answers to them."""
+ROUTES_SHARE = FLOWS_SHARE = 0.02
+"""Largest shares of the airtime for PDUs with only LSA, ROUTE, and answers to them, and with only
+FLOWS and ADMIT; the latter is that of all robots together."""
 UNANSWERED = 4
 """How many robots share the airtime for records, whether they hear us or not."""
 MOST_BEACON_S = 5.0
@@ -71,6 +73,7 @@ class ControlRecords:
         self._asking = asking
         self._routes = routes
         self._route_budget = Budget(ROUTES_SHARE)
+        self._air_budget = Budget(FLOWS_SHARE)
         self._own_id = own_id
         self._clear_size = clear_size
         self._params = params
@@ -221,6 +224,13 @@ class ControlRecords:
             due_at = max(alone_at, self._route_budget.free_at(now))
             self._piggyback.put_as(key, record, due_at)
             self._route_budget.spend(pdu_s, now, is_bounded=True)
+
+    def tell_air(self, records: Iterable[ToldOfAir], now: float, pdu_s: float) -> None:
+        """Offer what others must know of flows, in PDUs of `pdu_s` if there is no room."""
+        for record, key, alone_at in records:
+            self._piggyback.put_as(key, record, max(alone_at, self._air_budget.free_at(now)))
+            part = len(build_records([record])) / max(1, self._room)
+            self._air_budget.spend((1 + self._n_others) * part * pdu_s, now, is_bounded=True)
 
     def clear_key(self, start: float) -> BuiltPdu | None:
         """A PDU in the clear with the KEY record that is due at `start`, if one is."""

@@ -1,5 +1,6 @@
 """Fits the link to a radio: access policy, rate control, and times."""
 
+from math import ceil
 from random import Random
 from typing import NamedTuple
 
@@ -33,6 +34,21 @@ class Fit(NamedTuple):
     """Length of a pulse of energy."""
     is_lockstep: bool
     """Whether the radio runs in lock-step; the link's time then starts with the radio."""
+    pdu_burst_s: tuple[float, ...] = (0.0,)
+    """Length of a burst with one PDU, by MCS."""
+    longest_burst_s: tuple[float, ...] = (0.0,)
+    """Length of the longest burst, by MCS."""
+    overhead_s: float = 0.0
+    """Time that a burst takes in addition to its PDUs."""
+    gap_s: float = 0.0
+    """Time that stays free between two bursts."""
+
+    def message_s(self, mcs: int, n_pdus: int) -> float:
+        """Airtime in s of a message of so many PDUs, which goes in bursts of its own."""
+        each_s = max(0.0, self.pdu_burst_s[mcs] - self.overhead_s)
+        room_s = max(self.longest_burst_s[mcs] - self.overhead_s, each_s)
+        most = max(1, int(room_s / each_s)) if each_s else n_pdus
+        return n_pdus * each_s + ceil(n_pdus / most) * (self.overhead_s + self.gap_s)
 
 
 def fit_to(
@@ -57,4 +73,8 @@ def fit_to(
         traits.slower,
         traits.pulse_s,
         traits.is_lockstep,
+        traits.pdu_burst_s,
+        traits.longest_burst_s,
+        traits.overhead_s,
+        traits.gap_s,
     )
