@@ -6,9 +6,23 @@ from heapq import heappop, heappush
 from math import inf
 
 Edges = Mapping[int, Mapping[int, float]]
-"""What a PDU from one robot to another costs: `edges[a][b]`, in PDUs that are sent for it."""
+"""What a link from one robot to another costs, `edges[a][b]`: 1 if it loses nothing."""
+LOSSY = 2.0
+"""Exponent of the expected number of tries, until a PDU and its answer arrive, in the cost of a
+link: two hops that lose nothing are better than one that loses a sixth each way, as repeats take
+time, and may be lost, too."""
 NEAR = 1.1
 """How much longer than the best path one may be that takes fewer relays."""
+
+
+def cost_of(share: float, share_back: float) -> float:
+    """What a link costs over which these shares of PDUs arrive, one way and back."""
+    return float((share * share_back) ** -LOSSY)
+
+
+def pdus_sent(cost: float) -> float:
+    """How many PDUs are sent over a link of this cost until one arrives, the same both ways."""
+    return float(cost ** (0.5 / LOSSY))
 
 
 def distances(edges: Edges, source: int) -> tuple[dict[int, float], dict[int, int]]:

@@ -16,6 +16,7 @@ from sdrlinkd.link import (
     TopicPolicy,
 )
 from sdrlinkd.link.packing import PiggybackRecords
+from sdrlinkd.link.routes import cost_of
 from sdrlinkd.link.schedule import Claim, TeamAir, admitted, planner_of, transmissions
 from sdrlinkd.wire import BROADCAST, Admit, Beacon, Flows, RecordType, ReservedFlow
 from tests.laws import law
@@ -103,8 +104,9 @@ def test_the_planner_is_the_lowest_that_all_hear():
 
 
 def test_air_is_counted_over_the_whole_route():
-    chain = {1: {2: 1.0}, 2: {1: 1.0, 3: 1.5}, 3: {2: 1.5}}
-    assert transmissions(chain, 1, 3) == 2.5
+    lossy = cost_of(1 / 1.5, 1 / 1.5)
+    chain = {1: {2: 1.0}, 2: {1: 1.0, 3: lossy}, 3: {2: lossy}}
+    assert transmissions(chain, 1, 3) == pytest.approx(2.5)
     assert transmissions(chain, 1, 2) == 1.0
     assert transmissions(chain, 1, BROADCAST) == 2.0
     assert transmissions({}, 1, 9) == 1.0
@@ -170,8 +172,9 @@ def test_noise_of_the_links_does_not_take_air_from_a_flow():
 
     def word(cost):
         air.look(
-            air_at.pop(0), [flow(air=13_000)._replace(dst=1)], {1: {2: 1.0}, 2: {1: cost}}, 1.0
-        )
+            air_at.pop(0), [flow(air=13_000)._replace(dst=1)],
+            {1: {2: 1.0}, 2: {1: cost_of(1 / cost, 1 / cost)}}, 1.0,
+        )  # fmt: skip
         (each,) = air.flows()
         return each.air
 

@@ -7,7 +7,7 @@ not touch a PDU: `receive` asks it what to relay, `queue` holds what waits, and 
 records.
 """
 
-from sdrlinkd.link.paths import path, tree
+from sdrlinkd.link.paths import cost_of, path, tree
 from sdrlinkd.link.routes.fixed import FixedRoutes
 from sdrlinkd.link.routes.forwarding import Again
 from sdrlinkd.link.routes.params import RelayParams
@@ -20,6 +20,7 @@ __all__ = [
     "PduToRelay",
     "RelayParams",
     "Routes",
+    "cost_of",
     "path",
     "tree",
 ]

@@ -4,14 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 
-from sdrlinkd.link.paths import Edges, distances
+from sdrlinkd.link.paths import Edges, cost_of, distances
 from sdrlinkd.wire import BROADCAST, LSA_NUMBERS, MAX_LOSS, Lsa, lsa_digest, share_of
 
 MOST_ROBOTS = 32
 """Most robots of which LSAs are held."""
-LOSSY = 2.0
-"""Exponent of the expected number of tries in the cost of a link: two hops that lose nothing are
-better than one that loses a sixth each way, as repeats take time, and may be lost, too."""
 FORGOTTEN_S = 10.0
 """Time in s for which the LSA of a robot that cannot be reached is held."""
 LEAST_NEWS_S, LEAST_CHANGE_S = 0.1, 0.5
@@ -143,7 +140,7 @@ class LsaTable:
             for other, loss in losses.items():
                 back = heard.get(other, {}).get(node, MAX_LOSS)
                 if loss < MAX_LOSS and back < MAX_LOSS:
-                    edges[other][node] = (share_of(loss) * share_of(back)) ** -LOSSY
+                    edges[other][node] = cost_of(share_of(loss), share_of(back))
         self.edges = edges
         reached, _ = distances(edges, self._own_id)
         self.reached = sorted(node for node in reached if node in self._held)

@@ -1,9 +1,10 @@
 """Which flows of a team get air: a rule that any robot can compute, and who computes it."""
 
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import NamedTuple
 
-from sdrlinkd.link.paths import Edges, distances, path, tree
+from sdrlinkd.link.paths import Edges, path, pdus_sent, tree
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import BROADCAST
 
@@ -55,9 +56,10 @@ def transmissions(edges: Edges, src: int, dst: int) -> float:
     Nothing is saved by robots that are far enough apart to send at once.
     """
     if dst != BROADCAST:
-        return max(1.0, distances(edges, src)[0].get(dst, 1.0))
+        hops = pairwise(path(edges, src, dst))
+        return max(1.0, sum(pdus_sent(edges[one][other]) for one, other in hops))
     return sum(
-        max((edges[robot][each] for each in following), default=1.0)
+        max((pdus_sent(edges[robot][each]) for each in following), default=1.0)
         for robot, following in tree(edges, src).items()
     )
 
