@@ -281,14 +281,14 @@ def test_every_benchmark_is_in_the_list():
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(250)
+@pytest.mark.timeout(500)
 @pytest.mark.parametrize("name", ROWS)
 def test_a_benchmark_prints_its_rows(name):
     if reason := LACKING.get(name, str)():
         pytest.skip(reason)
     done = subprocess.run(
         [sys.executable, "-m", f"benchmarks.{name}", "--quick", "--json", *MORE.get(name, ())],
-        cwd=ROOT, capture_output=True, text=True, timeout=240,
+        cwd=ROOT, capture_output=True, text=True, timeout=480,
     )  # fmt: skip
     report = json.loads(done.stdout)
     assert report["benchmark"] == name

@@ -64,7 +64,7 @@ def _chain(seed: int, quick: bool) -> Iterator[Row]:
 
 
 def _chain5(seed: int, quick: bool) -> Iterator[Row]:
-    duration_s = 5.0 if quick else 60.0
+    duration_s = 4.0 if quick else 60.0
     ours = carry("grant", seed, duration_s, n=5, load=0.5)
     tdma = carry("tdma", seed, duration_s if quick else 15.0, n=5, load=0.5)
     for i, (name, target) in enumerate((("laser", 0.999), ("image", 0.999), ("joystick", 0.999))):
@@ -84,7 +84,7 @@ def _chain5(seed: int, quick: bool) -> Iterator[Row]:
 
 
 def _driving(seed: int, quick: bool) -> Iterator[Row]:
-    ours = drive("grant", seed, 20.0 if quick else 600.0)
+    ours = drive("grant", seed, 15.0 if quick else 600.0)
     for qos, target in (("urgent", 0.9999), ("latency", 0.999), ("default", 0.99)):
         yield Row(
             f"mobile_8_mdr_{qos}", ours.mdr(qos), "ratio", target, "more", ours.sent[qos],
