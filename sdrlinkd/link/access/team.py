@@ -24,7 +24,7 @@ class Places(NamedTuple):
     levels: Mapping[int, int]
     parents: Mapping[int, int]
     costs: Mapping[int, float]
-    """What a PDU from the root costs, in PDUs that are sent for it."""
+    """What the best path from the root costs."""
 
     def is_behind(self, node: int, relay: int) -> bool:
         """Whether robot `node` hears plans through `relay`, directly or through others."""
@@ -104,9 +104,9 @@ class Team:
         return self._apart if now > self._near_since + SETTLED_S else NONE_APART
 
     def reach(self, root: int, others: Collection[int]) -> int:
-        """PDUs that have to be sent until one of `root` is at the farthest of `others`.
+        """The cost of the path from `root` to the farthest of `others`; FAR if it is not known.
 
-        That is the number of hops, more where links lose PDUs. FAR: it is not known.
+        That is the number of hops, and more where links lose PDUs.
         """
         costs = self.places(root).costs
         return min(FAR, max((round(costs.get(node, FAR)) for node in others), default=FAR))
