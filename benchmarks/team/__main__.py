@@ -107,7 +107,8 @@ def _turnaround(seed: int, quick: bool) -> Iterator[Row]:
             found.n, peers={"mdr": found.mdr, "longest_round_ms": 1e3 * found.longest_round_s},
             note=(
                 "five radios, turnaround 50 ms; four have more bulk than the air carries, the "
-                f"fifth sends {size} B at random, once a second; a frame is the longest round"
+                f"fifth sends {size} B at random, once a second; a frame is the longest round; "
+                "what waits longer than 1 s expires, see mdr"
             ),
         )  # fmt: skip
 

@@ -43,6 +43,12 @@ def test_what_a_relay_sends_may_be_far_behind(behind):
     assert (track.lost, track.restarts) == (0, 0)
 
 
+def test_the_first_pdu_that_a_relay_sends_may_be_far_ahead():
+    track = SequenceTrack()
+    assert track.heard(10, 1)
+    assert track.heard(10 + 60, 2, 0.1, forwarded=Qos.LATENCY)
+
+
 def test_what_overtakes_at_a_relay_shows_what_waits_there():
     track = SequenceTrack()
     for number in range(300):

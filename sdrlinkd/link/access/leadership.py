@@ -16,7 +16,7 @@ from sdrlinkd.wire import FAR, Frame
 
 LISTEN_S = 1.0
 """A robot plans rounds of its own after hearing no plan for this time in s, and some rounds."""
-BETTER_S = 2.0
+BETTER_S = 1.0
 """Time in s for which a robot must have been a better root before it takes over."""
 LOST_ROUNDS = 2.2
 """Rounds without a plan, for each hop to the root, after which the root is lost."""

@@ -9,6 +9,8 @@ from sdrlinkd.link.access.reuse import NONE_APART, Apart
 from sdrlinkd.link.paths import Edges, distances
 from sdrlinkd.wire import FAR
 
+DOUBTFUL = 4.0
+"""Cost of a link that was heard lately, and that LSAs do not tell."""
 SETTLED_S = 5.0
 """Time in s for which the same robots must have heard each other before two may send at once."""
 PRESENT_S = 3.5
@@ -128,11 +130,10 @@ class Team:
         known = {node: dict(links) for node, links in self._lsa_edges.items()}
         edges: defaultdict[int, dict[int, float]] = defaultdict(dict, known)
         for one, other in self._link_at:
-            if one in known and other in known:
-                # Their LSAs know better.
-                continue
-            edges[one].setdefault(other, 1.0)
-            edges[other].setdefault(one, 1.0)
+            # If they have LSAs that do not name each other, these know better.
+            cost = DOUBTFUL if one in known and other in known else 1.0
+            edges[one].setdefault(other, cost)
+            edges[other].setdefault(one, cost)
         return edges
 
 

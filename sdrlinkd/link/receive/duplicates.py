@@ -193,7 +193,11 @@ class SequenceTrack:
         if late in self._seen or at - self._newest_at > LATELY_S:
             return number
         is_repeated = late <= self._reached.get(forwarded, -1)
-        overtakes = is_repeated and forwarded is not max(self._reached) and ahead < OVERTAKEN
+        overtakes = (
+            is_repeated
+            and forwarded is not max(self._reached, default=forwarded)
+            and ahead < OVERTAKEN
+        )
         return number if overtakes else late
 
     def _aligned(self, number: int, told: int, at: float) -> int:

@@ -44,9 +44,10 @@ class Repetitions:
         mcs, n_told = group.mcs, 0 if group.is_relayed or group.announced else 1
         slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1 + n_told), sensed))
         if slot is None and (access.keeps_schedule or access.by_request is not None):
-            # Slots may be made for one PDU, or for faster bursts.
+            # Slots may be made for one PDU, or for faster bursts. A turn is made for what we asked.
             mcs = group.kept[0].mcs
-            slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed))
+            least = 1 + n_told if access.by_request is not None else 1
+            slot = access.slot(Wish(earliest, qos, airtime_s(mcs, least), sensed))
         if slot is None:
             return None
         group = group.alive(slot.start)
