@@ -7,6 +7,8 @@ every view renders that snapshot.
 
 import msgspec
 
+EVERYONE = 255
+"""In the place of a robot's id: what is for everyone."""
 RATE_WINDOW_S = 5.0
 """Window in s of all rates and recent shares."""
 

@@ -13,9 +13,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
-from benchmarks.peers.pound.control import CAPACITANCE, GAIN, INDUCTANCE, RESISTANCE, SETPOINT
+from benchmarks.peers.pound.control import GAIN, SETPOINT
+from benchmarks.peers.pound.control import plant as step_matrices
 
 State = NDArray[np.float64]
 """(Vc, Vc')."""
@@ -32,18 +32,7 @@ ANSWERS = 64
 """Answers that the controller remembers."""
 
 
-def step_matrices() -> tuple[State, State]:
-    """A `[2, 2]` and b `[2]` of one step: x becomes A x + b u."""
-    lc = INDUCTANCE * CAPACITANCE
-    whole = np.zeros((3, 3))
-    whole[0, 1] = 1.0
-    whole[1] = [-1 / lc, -RESISTANCE * CAPACITANCE / lc, 1 / lc]
-    # exp of [[F, g], [0, 0]] T contains exp(F T) and the integral of exp(F t) g.
-    whole = expm(whole * STEP_S)
-    return whole[:2, :2], whole[:2, 2]
-
-
-A, B = step_matrices()
+A, B = step_matrices(STEP_S)
 
 
 def pushes(rng: np.random.Generator, seconds: float) -> State:

@@ -108,7 +108,7 @@ def _turnaround(seed: int, quick: bool) -> Iterator[Row]:
             note=(
                 "five radios, turnaround 50 ms; four have more bulk than the air carries, the "
                 f"fifth sends {size} B at random, once a second; a frame is the longest round; "
-                "what waits longer than 1 s expires, see mdr"
+                "a message that goes on later than 1 s after it was begun is given up, see mdr"
             ),
         )  # fmt: skip
 

@@ -19,7 +19,7 @@ AIR = AirParams(
 )  # fmt: skip
 MODEM = ModemParams(rate_hz=RATE_HZ, mcs=3, max_burst_s=0.02, block_s=AIR.block_s)
 HEARD_DB = 8.0
-"""SNR from which a link counts: one PDU in a thousand is lost."""
+"""SNR from which a link counts; it loses next to nothing."""
 BEFORE_S, AFTER_S = 2.0, 0.5
 """A path must have been there for so long before a message is sent, and stay for so long."""
 STEP_S = 0.1

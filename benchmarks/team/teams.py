@@ -57,6 +57,8 @@ class Flow(NamedTuple):
     begin_s: float
     counted_at: int = BROADCAST
     qos: Literal["urgent", "latency", "default", "bulk"] = "default"
+    lifespan_s: float | None = None
+    """As the key of the topic; None: that of the class."""
     is_random: bool = False
     """Whether the messages come at random, every `period_s` on average."""
     least_s: float = 0.0
@@ -101,8 +103,8 @@ class Strain(NamedTuple):
     keep_s: float = 0.0
     """Time for which the SNR of a pair counts."""
     relays: bool = True
-    left: Callable[[int, Burst, Flight], None] = lambda *_: None
-    """Called with each burst and its sender."""
+    watch: Callable[[Flight, Burst], None] = lambda *_: None
+    """Called with each burst of PDUs."""
 
 
 class Team:
@@ -155,7 +157,7 @@ class Team:
             listen=self._listen,
             keep_s=strain.keep_s,
             lost=strain.lost,
-            left=strain.left,
+            watch=strain.watch,
         )
 
     def forwarded_by(self, node: int, src: int, dst: int) -> list[int]:
@@ -198,7 +200,9 @@ class Team:
         )
         link.set_policies(
             {
-                topic_id: TopicPolicy(dst=each.flow.dst, qos=each.flow.qos)
+                topic_id: TopicPolicy(
+                    dst=each.flow.dst, qos=each.flow.qos, lifespan_s=each.flow.lifespan_s
+                )
                 for (topic_id, _), each in self._by_topic.items()
             }
         )

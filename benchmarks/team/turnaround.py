@@ -12,7 +12,9 @@ TURNAROUND_S = 0.05
 RATE_BYTES = 7.5e5
 """What the air carries in a second."""
 BULK_SIZE, PERIOD_S = 4096, 1.0
-BEGIN_S, REST_S = 5.0, 2.0
+BEGIN_S, REST_S = 5.0, 5.0
+LIFESPAN_S = 60.0
+"""So long that none is dropped: a wait that ends nowhere would not count."""
 
 
 class Waits(NamedTuple):
@@ -22,6 +24,8 @@ class Waits(NamedTuple):
     longest_round_s: float
     mdr: float
     n: int
+    forwarded: int
+    """PDUs that robots forwarded, though all hear all."""
 
 
 def wait_for_turns(size: int, seed: int, duration_s: float) -> Waits:
@@ -42,11 +46,12 @@ def wait_for_turns(size: int, seed: int, duration_s: float) -> Waits:
     flows.append(
         Flow(
             "urgent", ids[-1], 255, size, PERIOD_S, n, BEGIN_S, counted_at=1, qos="urgent",
-            is_random=True,
+            lifespan_s=LIFESPAN_S, is_random=True,
         )
     )  # fmt: skip
     team = Team(ids, list(combinations(ids, 2)), flows, seed, "grant", turnaround_s=TURNAROUND_S)
     urgent = team.heard[-1]
     team.simulation.run(urgent.sent_at[-1] + REST_S)
     round_s = team.simulation.stations[1].settled.access.round_s
-    return Waits(float(np.quantile(urgent.delays_s, 0.99)), round_s, urgent.mdr, n)
+    forwarded = sum(team.forwarded(node) for node in ids)
+    return Waits(float(np.quantile(urgent.delays_s, 0.99)), round_s, urgent.mdr, n, forwarded)

@@ -80,8 +80,8 @@ class _Seen:
     bursts: list[tuple[float, float]] = field(default_factory=list)
     """Its bursts with something urgent, as (begin, end)."""
 
-    def left(self, node: int, burst: Burst, flight: Flight) -> None:
-        if node != self.node or Qos.URGENT not in burst.classes:
+    def left(self, flight: Flight, burst: Burst) -> None:
+        if flight.sender != self.node or Qos.URGENT not in burst.classes:
             return
         self.bursts.append((flight.start_s, flight.end_s))
         for carried, (_, end_s) in zip(burst.carried, flight.shape.pdus, strict=True):
@@ -128,11 +128,11 @@ def strain(policy: Policy, n: int, seed: int, duration_s: float, *, is_calm: boo
         if access.lacks:
             seen.lacked_at.append(simulation.now)
 
-    def left(node: int, burst: Burst, flight: Flight) -> None:
+    def watch(flight: Flight, burst: Burst) -> None:
         look()
-        seen.left(node, burst, flight)
+        seen.left(flight, burst)
 
-    how = Strain(tracks, off, 0.0 if is_calm else LOST, KEEP_S, relays=False, left=left)
+    how = Strain(tracks, off, 0.0 if is_calm else LOST, KEEP_S, relays=False, watch=watch)
     team = Team(ids, list(combinations(ids, 2)), flows, seed, policy, PDU_SIZE, modem=MODEM,
                 strain=how)  # fmt: skip
     simulation = team.simulation

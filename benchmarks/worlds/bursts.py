@@ -59,11 +59,10 @@ class Simulation:
     """One BurstChannel and a real link for each of `radios`; `arrivals` are in order of time.
 
     Decisions are made at the ends of blocks of `air.block_s`, as in a simulation of samples in
-    lock-step. `watch` is called for every burst, `listen` for what a node receives, with its time.
-    `left` is called for every burst of PDUs that begins to leave. `keep_s`, `lost`: see
-    BurstChannel. Raises ConfigError if the radios cannot support the access policy.
-    `fit` turns the air's traits into those of another radio, such as one that needs its bursts
-    earlier.
+    lock-step. `watch` is called for every burst of PDUs, `listen` for what a node receives, with
+    its time. `keep_s`, `lost`: see BurstChannel. Raises ConfigError if the radios cannot support
+    the access policy. `fit` turns the air's traits into those of another radio, such as one that
+    needs its bursts earlier.
     """
 
     def __init__(
@@ -82,9 +81,8 @@ class Simulation:
         keep_s: float = 0.0,
         lost: float = 0.0,
         fit: Callable[[PduLinkTraits], PduLinkTraits] = lambda traits: traits,
-        watch: Callable[[Flight], None] = lambda _: None,
+        watch: Callable[[Flight, Burst], None] = lambda *_: None,
         listen: Callable[[int, Delivered, float], None] = lambda *_: None,
-        left: Callable[[int, Burst, Flight], None] = lambda *_: None,
     ) -> None:
         self.now = 0.0
         self.pairs: defaultdict[tuple[int, int, int], Pair] = defaultdict(Pair)
@@ -94,7 +92,6 @@ class Simulation:
         self._access = access
         self._watch = watch
         self._listen = listen
-        self._left = left
         grid = phy.GRIDS[modem.grid]
         self._medium = BurstChannel(air, world, seed, modem.carrier_db, keep_s, grid, lost)
         self._events: list[_Event] = []
@@ -217,8 +214,7 @@ class Simulation:
         left = self._block(flight.end_s)
         self._at(left, _HEAR, link.confirm, burst, Outcome.SENT, flight.end_s * pace)
         self._at(self._block(flight.over_s), _SETTLE, self._medium.settle, flight)
-        self._watch(flight)
-        self._left(link.own_id, burst, flight)
+        self._watch(flight, burst)
 
     def _hear(self, flight: Flight, number: int, pdu: bytes, nodes: list[int]) -> None:
         for node, snr_db in self._medium.readers(flight, number, nodes):

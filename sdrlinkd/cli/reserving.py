@@ -53,7 +53,10 @@ def verdict_words(answer: dict[str, Any]) -> str:
     """The word of the team on a flow, in one sentence."""
     flow, report = answer["flow"], answer["report"]
     if flow is None:
-        return "nothing is reserved yet: is the radio up? sdrlinkctl status"
+        return (
+            "nothing is reserved yet: the radio is down (sdrlinkctl status), or the configuration "
+            "has admission.share = 0"
+        )
     needs = f"{flow['air_pct']:.3g} % of the air over its route"
     of = f"{report['admitted_pct']:.3g} of {report['limit_pct']:.3g} % are taken"
     if flow["admitted"] is None:

@@ -14,18 +14,13 @@ from sdrlinkd.link import (
     AUCTION_PATIENCE,
     CLOCK_ERROR_S,
     LEAST_TURNS,
+    TURN_STANDS,
     Csma,
     PduLinkTraits,
     Qos,
     Settled,
 )
-
-RARE = 0.01
-"""Share of messages that may wait longer than the bound of csma."""
-LEVEL = Qos.LATENCY
-"""The least urgent class of minislot's higher level."""
-STANDS = 0.5
-"""Share of a round's budget for which a robot's turn may be left out after it had one (grant)."""
+from sdrlinkd.plan.supply import LEVEL, RARE
 
 
 class AccessBound(NamedTuple):
@@ -138,7 +133,7 @@ def _grant_s(air: _Air, qos: Qos, others: Qos) -> float:  # noqa: ARG001  # the 
     access = air.settled.access
     round_s = access.round_s
     if air.robots - 1 <= LEAST_TURNS + 1:
-        waits_s = 2 * round_s - (1 - STANDS) * access.share * air.robots * round_s
+        waits_s = 2 * round_s - (1 - TURN_STANDS) * access.share * air.robots * round_s
     else:
         waits_s = (1 + math.ceil((air.robots - 1) / LEAST_TURNS)) * round_s
     return air.missed_s + waits_s + air.one_s

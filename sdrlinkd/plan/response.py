@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from sdrlinkd.link import IDLE_SHARE, OVERRUN, SHARED_OVERRUN, Qos, TopicPolicy
 from sdrlinkd.plan.air import Setting
-from sdrlinkd.plan.supply import Supply
+from sdrlinkd.plan.supply import LEVEL, Supply
 from sdrlinkd.plan.traffic import Load
 
 FOREVER = float("inf")
@@ -22,9 +22,6 @@ MOST_WAITING = 200
 RECORDS_S, RECORDS = 1.0, 0.02
 """Period in s of one PDU with a beacon's records, and share of airtime for all CLOCKs and RECEIPTs.
 """
-LEVEL = Qos.LATENCY
-"""Least urgent class of the higher level, which all robots serve first; within a level they take
-turns."""
 
 
 class Task(NamedTuple):

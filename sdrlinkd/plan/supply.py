@@ -8,6 +8,9 @@ from sdrlinkd.link import PduLinkTraits, Qos, Settled
 INFINITE = float("inf")
 SECTIONS = 2
 """Number of sections of mini-slots: the higher level and the lower."""
+LEVEL = Qos.LATENCY
+"""Least urgent class of the higher level, which all robots serve first; within a level they take
+turns."""
 RARE = 0.01
 """Share of csma's random waits that may exceed the wait that counts as the longest."""
 

@@ -60,7 +60,8 @@ def saturated(access, n, qos=Qos.DEFAULT, *, rate_hz=5e6, block_s=1e-3, seconds=
     sim = Simulation(
         air, World(air, {}), radios, links, modem, airtimes,
         AccessParams(policy=access, nodes=list(ids), force=True),
-        {node: arrivals(node) for node in ids}, seed=seed, fit=fit, watch=flights.append,
+        {node: arrivals(node) for node in ids}, seed=seed, fit=fit,
+        watch=lambda flight, _: flights.append(flight),
     )  # fmt: skip
     sim.run(until_s)
     used_s = sum(each.end_s - each.start_s for each in flights if each.start_s > SETTLE_S)

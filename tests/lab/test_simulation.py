@@ -141,7 +141,7 @@ class Overlaps:
     def __init__(self):
         self.flights = []
 
-    def __call__(self, flight):
+    def __call__(self, flight, _burst):
         self.flights.append((flight.start_s, flight.end_s, flight.sender))
 
     @property

@@ -17,7 +17,7 @@ from sdrlinkd.link import (
 )
 from sdrlinkd.link.packing import PiggybackRecords
 from sdrlinkd.link.routes import cost_of
-from sdrlinkd.link.schedule import Claim, TeamAir, admitted, planner_of, transmissions
+from sdrlinkd.link.schedule import Claim, TeamAir, admitted, planner_of, way_of
 from sdrlinkd.wire import BROADCAST, Admit, Beacon, Flows, RecordType, ReservedFlow
 from tests.laws import law
 from tests.link.lossy import PDU_SIZE, Air
@@ -106,10 +106,10 @@ def test_the_planner_is_the_lowest_that_all_hear():
 def test_air_is_counted_over_the_whole_route():
     lossy = cost_of(1 / 1.5, 1 / 1.5)
     chain = {1: {2: 1.0}, 2: {1: 1.0, 3: lossy}, 3: {2: lossy}}
-    assert transmissions(chain, 1, 3) == pytest.approx(2.5)
-    assert transmissions(chain, 1, 2) == 1.0
-    assert transmissions(chain, 1, BROADCAST) == 2.0
-    assert transmissions({}, 1, 9) == 1.0
+    assert way_of(chain, 1, 3).n_sent == pytest.approx(2.5)
+    assert way_of(chain, 1, 2).n_sent == 1.0
+    assert way_of(chain, 1, BROADCAST) == (2.0, [2])
+    assert way_of({}, 1, 9) == (1.0, [])
 
 
 # A team.

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from rich.console import RenderableType
 from rich.text import Text
 
-from sdrlinkd.reports import FlowReport, RoutesReport
+from sdrlinkd.reports import EVERYONE, FlowReport, RoutesReport
 from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
-EVERYONE = 255
 WEAK = 0.9
 """Share of PDUs below which a link is marked."""
 

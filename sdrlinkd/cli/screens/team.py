@@ -6,10 +6,9 @@ from math import inf
 from rich.console import RenderableType
 from rich.text import Text
 
-from sdrlinkd.reports import AdmissionReport, ReservedFlowReport
+from sdrlinkd.reports import EVERYONE, AdmissionReport, ReservedFlowReport
 from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
-EVERYONE = 255
 COLUMNS = (
     words("robot", least=5), words("topic", least=8), words("class", least=7), figure("Hz"),
     figure("bytes", 2), words("to", least=3), words("over", least=4), figure("air"),

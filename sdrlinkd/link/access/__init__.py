@@ -30,6 +30,7 @@ from sdrlinkd.link.access.params import AccessParams
 from sdrlinkd.link.access.requests import Due, Waiting, together, waiting_of, want_of
 from sdrlinkd.link.access.reuse import Apart, stages, told
 from sdrlinkd.link.access.round_plan import LEAST_TURNS, Times, before, plan, shares
+from sdrlinkd.link.access.round_plan import STANDS as TURN_STANDS
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S, Tdma
 from sdrlinkd.link.access.tdma_states import STEPS as TDMA_STEPS
@@ -52,6 +53,7 @@ __all__ = [
     "LONGEST_ROUND_S",
     "MARGIN_S",
     "TDMA_STEPS",
+    "TURN_STANDS",
     "Access",
     "AccessParams",
     "Apart",

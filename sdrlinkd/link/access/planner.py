@@ -121,12 +121,12 @@ class Planner:
             after_s = max(after_s, last.end - start)
         begins_us = math.ceil(1e6 * after_s)
         begin = start + 1e-6 * begins_us
+        ticks, places = times.ticks, team.places(self._own_id)
         is_absent = len(present) + 1 < len(team.nodes)
         turns = plan(
-            times, begin, present, given, wanted, team.places(self._own_id), self._served_at,
+            times, begin, present, given, wanted, places, self._served_at,
             is_open=is_absent and (not wanted or self._is_overdue(ANYBODY, begin)),
         )  # fmt: skip
-        ticks, places = times.ticks, team.places(self._own_id)
         uses = {node: ticks.count(times.turn_s + each.all_s) for node, each in wanted.items()}
         dues = self._heeded(begin)
         most = MOST_TOLD - SPARE_TURNS * bool(dues)
@@ -136,7 +136,7 @@ class Planner:
             found = before(dues, self._own_id, ticks, begin, found, times.turn_s, keep)
         turns = told(found, ticks)[:MOST_TOLD]
         self._number = (self._number + 1) % NUMBERS
-        made = times.ticks.round(self._number, begin, turns)
+        made = ticks.round(self._number, begin, turns)
         for turn in made.turns:
             self._served_at[turn.node] = turn.begin
             self._requests.given(turn.node, turn.end - turn.begin)

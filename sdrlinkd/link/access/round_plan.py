@@ -170,6 +170,11 @@ def before(
     def end_of(found: list[Stage]) -> float:
         return ticks.round(0, begin, told(found, ticks)).end
 
+    def shorter(node: int, length: int, over_s: float) -> tuple[int, int]:
+        """A turn without what is over, as far as its robot does not keep that."""
+        shortest = min(length, max(least, kept.get(node, 0)))
+        return node, max(shortest, length - ticks.count(over_s))
+
     rest = _those(turns, lambda node, length: node != first.node or length > 2 * least)
 
     if end_of(rest) < first.at - 2 * turn_s:
@@ -179,17 +184,7 @@ def before(
     for i in range(len(rest) - 1, -1, -1):
         over_s = end_of(rest) - first.at
         if over_s > 0:
-            rest[i] = beside(
-                *(
-                    (
-                        node,
-                        max(
-                            min(length, max(least, kept.get(node, 0))), length - ticks.count(over_s)
-                        ),
-                    )
-                    for node, length in rest[i]
-                )
-            )
+            rest[i] = beside(*(shorter(*turn, over_s) for turn in rest[i]))
     for due in dues:
         at = end_of(rest)
         if due.at > at + 2 * turn_s and due is not first:

@@ -67,7 +67,9 @@ class Qualities:
         if is_direct:
             heard.arrived += 1
             gap_s = min(max(0.0, at - heard.direct_at), MOST_SILENCE_S)
-            heard.gap_s = max(gap_s, GAP_DECAY * heard.gap_s)
+            if gap_s > 0:
+                # The PDUs of a burst came together.
+                heard.gap_s = max(gap_s, GAP_DECAY * heard.gap_s)
             heard.direct_at = max(at, heard.direct_at)
             heard.snr_db = snr_db
 

@@ -5,7 +5,7 @@ their credit, budgets of airtime, and the flows of the team that air is reserved
 neither queue nor radio; their state is passed in as arguments.
 """
 
-from sdrlinkd.link.schedule.admitted import Claim, admitted, planner_of, transmissions
+from sdrlinkd.link.schedule.admitted import Claim, admitted, planner_of, way_of
 from sdrlinkd.link.schedule.allowance import (
     IDLE_SHARE,
     OVERRUN,
@@ -50,5 +50,5 @@ __all__ = [
     "UrgentParams",
     "admitted",
     "planner_of",
-    "transmissions",
+    "way_of",
 ]

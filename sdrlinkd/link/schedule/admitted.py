@@ -25,6 +25,13 @@ class Claim(NamedTuple):
     had_air: bool = False
 
 
+class Way(NamedTuple):
+    """A PDU is sent `n_sent` times on average until it has arrived, and `relays` forward it."""
+
+    n_sent: float
+    relays: list[int]
+
+
 def admitted(claims: Iterable[Claim], limit: float) -> set[FlowKey]:
     """The flows that get air, in shares of the airtime that sum up to `limit` at most.
 
@@ -50,25 +57,21 @@ def planner_of(edges: Edges, own_id: int) -> int:
     return min(reached, key=lambda robot: (len(_rings(edges, robot)), robot))
 
 
-def transmissions(edges: Edges, src: int, dst: int) -> float:
-    """How often a PDU from `src` is sent on average until it is at `dst`, or at everyone.
+def way_of(edges: Edges, src: int, dst: int) -> Way:
+    """How PDUs from `src` come to `dst`, or to everyone.
 
     Nothing is saved by robots that are far enough apart to send at once.
     """
     if dst != BROADCAST:
-        hops = pairwise(path(edges, src, dst))
-        return max(1.0, sum(pdus_sent(edges[one][other]) for one, other in hops))
-    return sum(
-        max((pdus_sent(edges[robot][each]) for each in following), default=1.0)
-        for robot, following in tree(edges, src).items()
+        robots = path(edges, src, dst)
+        n_sent = sum(pdus_sent(edges[one][other]) for one, other in pairwise(robots))
+        return Way(max(1.0, n_sent), robots[1:-1])
+    following = tree(edges, src)
+    n_sent = sum(
+        max((pdus_sent(edges[robot][each]) for each in next_ones), default=1.0)
+        for robot, next_ones in following.items()
     )
-
-
-def relays_of(edges: Edges, src: int, dst: int) -> list[int]:
-    """The robots that forward what `src` sends to `dst`, or to everyone."""
-    if dst != BROADCAST:
-        return path(edges, src, dst)[1:-1]
-    return sorted(robot for robot in tree(edges, src) if robot != src)
+    return Way(n_sent, sorted(following.keys() - {src}))
 
 
 def _rings(edges: Edges, robot: int) -> list[set[int]]:

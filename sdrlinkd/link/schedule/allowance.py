@@ -40,13 +40,12 @@ class Allowance(NamedTuple):
 
     def above(self, qos: Qos) -> "Allowance":
         """The allowance for only the classes more urgent than `qos`, with room for one more PDU."""
-        most = (max(0, n - 1) if each < qos else 0 for each, n in zip(Qos, self.most, strict=True))
-        return Allowance(tuple(most))
+        return self.more_urgent(qos).fewer(1)
 
-    def down_to(self, qos: Qos) -> "Allowance":
-        """The allowance for only the classes more urgent than `qos`, if there are any."""
-        most = tuple(n if each < qos else 0 for each, n in zip(Qos, self.most, strict=True))
-        return Allowance(most) if any(most) else self
+    def more_urgent(self, qos: Qos) -> "Allowance":
+        """The allowance for only the classes more urgent than `qos`."""
+        most = (n if each < qos else 0 for each, n in zip(Qos, self.most, strict=True))
+        return Allowance(tuple(most), until=self.until)
 
     def fewer(self, n: int) -> "Allowance":
         """This allowance, less `n` PDUs."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
-from sdrlinkd.link.schedule.admitted import Claim, admitted, planner_of, relays_of, transmissions
+from sdrlinkd.link.schedule.admitted import Claim, Way, admitted, planner_of, way_of
 from sdrlinkd.link.schedule.flow_table import FlowTable, is_sound
 from sdrlinkd.link.schedule.params import AdmissionParams
 from sdrlinkd.link.schedule.retelling import RecordKey, Retelling
@@ -83,8 +83,8 @@ class TeamAir:
         """The robot that decides."""
         self.limit = 0.0
         """Share of the airtime that flows may take together."""
-        self._airs: dict[tuple[int, int], float] = {}
-        """How often a PDU is sent, by source and destination."""
+        self._ways: dict[tuple[int, int], Way] = {}
+        """By source and destination."""
         self._judged: tuple[int, float] | None = None
         self._retelling = Retelling()
         self._looks_at = -inf
@@ -169,7 +169,7 @@ class TeamAir:
         verdicts = self._verdicts
         return [
             TeamFlow(
-                src, flow, self._air(src, flow), relays_of(self._edges, src, flow.dst),
+                src, flow, self._air(src, flow), self._way(src, flow.dst).relays,
                 None if verdicts is None else verdicts.word((src, flow.topic)),
             )
             for src, flow in self._table.flows()
@@ -257,21 +257,25 @@ class TeamAir:
         return None if self._verdicts is None else self._verdicts.record(node)
 
     def _air(self, src: int, flow: ReservedFlow) -> float:
-        ends = src, flow.dst
-        if ends not in self._airs:
-            self._airs[ends] = transmissions(self._edges, src, flow.dst)
-        return flow.air * FLOW_AIR_UNIT * self._airs[ends]
+        return flow.air * FLOW_AIR_UNIT * self._way(src, flow.dst).n_sent
+
+    def _way(self, src: int, dst: int) -> Way:
+        if (src, dst) not in self._ways:
+            self._ways[src, dst] = way_of(self._edges, src, dst)
+        return self._ways[src, dst]
 
     def _cost_anew(self) -> None:
-        """Take the costs of the routes anew, except those that have hardly changed.
+        """Find the routes anew, but keep what they cost if that has hardly changed.
 
         So a flow does not lose its air to the noise of what is measured.
         """
-        before, self._airs = self._airs, {}
+        before, self._ways = self._ways, {}
         for ends in {(src, flow.dst) for src, flow in self._table.flows()}:
-            cost = transmissions(self._edges, *ends)
-            known = before.get(ends, cost)
-            self._airs[ends] = known if abs(cost - known) <= STEADY * known else cost
+            way = way_of(self._edges, *ends)
+            known = before.get(ends, way).n_sent
+            if abs(way.n_sent - known) <= STEADY * known:
+                way = way._replace(n_sent=known)
+            self._ways[ends] = way
 
     def _all_hear(self, teller: int) -> bool:
         """Whether all robots that we hear are known to hear the one that told something."""

@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from math import ceil
 
+from sdrlinkd.link.packing import parity_pdus
 from sdrlinkd.link.qos import QOS_BY_LABEL
 from sdrlinkd.link.queue import Intake, TopicPolicy
 from sdrlinkd.link.schedule import ClassesParams
@@ -10,16 +11,17 @@ from sdrlinkd.link.topics import OwnTopics
 from sdrlinkd.link.transmit.fit import Fit
 from sdrlinkd.wire import (
     ALL_AIR,
+    ASKING_STAMP_SIZE,
     ENTRY_HEADER_SIZE,
     FLOW_AIR_UNIT,
     MAX_FRAGMENTS,
     PART_PARITY,
     STAMP_SIZE,
     ReservedFlow,
+    fragment_count,
     octet,
 )
 
-FEWEST_WITH_PARITY = 4
 MOST_TOLD = (1 << 32) - 1
 
 
@@ -48,10 +50,12 @@ class OwnFlows:
         qos, rate = QOS_BY_LABEL[policy.qos], fit.rate
         to = [dst] if dst in heard else heard
         mcs = min((rate.heard_there(each).mcs for each in to), default=rate.lowest)
-        n_pdus = ceil((policy.max_bytes + STAMP_SIZE + ENTRY_HEADER_SIZE) / self._k)
-        if n_pdus >= FEWEST_WITH_PARITY:
-            least = PART_PARITY if n_pdus > MAX_FRAGMENTS else 0.0
-            n_pdus += ceil(max(least, self._classes.of(qos).parity) * n_pdus)
+        n_pdus = fragment_count(policy.max_bytes + STAMP_SIZE + ENTRY_HEADER_SIZE, self._k)
+        # Of a message in parts, each part has parity of its own, which comes to about the same.
+        parity = max(PART_PARITY * (n_pdus > MAX_FRAGMENTS), self._classes.of(qos).parity)
+        total = min(n_pdus, MAX_FRAGMENTS)
+        n_parity = parity_pdus(self._k, total, parity, self._k - ASKING_STAMP_SIZE)
+        n_pdus += ceil(n_parity * n_pdus / total)
         air = fit.message_s(mcs, n_pdus) / (policy.period_s * FLOW_AIR_UNIT)
         return ReservedFlow(
             topic, dst, qos, policy.priority, min(max(1, ceil(air)), ALL_AIR),

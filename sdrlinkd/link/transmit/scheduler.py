@@ -158,11 +158,12 @@ class BurstScheduler:
         qos, mcs = Qos.DEFAULT if head is None else head, rate.lowest
         if rate.adapts and head is not None:
             mcs = rate.mcs(self._outbox.destinations(), qos, earliest)
+        # Those that are repeated after this burst, before others of their class.
+        then = None if head is None or self._has_repeated else repeated
         waiting, then_s = None, 0.0
         dues: tuple[Due, ...] = ()
-        repeats_next = repeated is not None and head is not None and not self._has_repeated
         if turns is not None:
-            if repeats_next:
+            if then is not None:
                 then_s = turns.repeats_s(partial(airtime_s, mcs))
             waiting = turns.waiting(earliest, partial(airtime_s, mcs))
             dues = turns.dues(earliest, partial(airtime_s, mcs))
@@ -180,9 +181,8 @@ class BurstScheduler:
         allowance = self._allowance(
             slot, mcs, opportunity, Qos.DEFAULT if start >= records_due_at else None
         )
-        if repeats_next and repeated is not None:
-            # What is more urgent goes first. Then PDUs are repeated, before others of their class.
-            allowance = allowance.down_to(repeated)
+        if then is not None and any((higher := allowance.more_urgent(then)).most):
+            allowance = higher
         frame = access.frame(start) if access.keeps_schedule else None
         # A schedule's phase is valid only for the planned start.
         is_timed = frame is not None and records.tells_schedule(start)
