@@ -8,7 +8,7 @@ import msgspec
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link.access import LEAST_BID_ROOM, LEAST_ROOM, AccessParams
+from sdrlinkd.link.access import AccessParams
 from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.paths import Edges
@@ -218,9 +218,9 @@ class Link:
     def attach(self, traits: PduLinkTraits, access: AccessParams, rate: RateParams) -> Fit:
         """Fit the link to a radio that is up. Raises ConfigError and then changes nothing."""
         fit = fit_to(traits, access, rate, self.own_id, self._rng)
-        policy, asks = fit.settled.policy, {"grant": LEAST_ROOM, "auction": LEAST_BID_ROOM}
-        missing = asks.get(policy, 0) - self._composer.k_whole
-        if policy in asks and not self.registry.has_control:
+        policy, least = fit.settled.policy, fit.settled.access.least_room
+        missing = least - self._composer.k_whole
+        if least and not self.registry.has_control:
             raise ConfigError(
                 f'access.policy: got "{policy}", which tells what waits in records; 16 topics in '
                 "the registry leave no number for them: allowed are 15"
@@ -242,6 +242,8 @@ class Link:
         of their own.
         """
         self._fit = fit
+        if fit.settled.access.needs_links:
+            self._routes.tell_links()
         if isinstance(self._scheduler, NoRadio):
             self._scheduler = BurstScheduler(
                 fit, self._outbox, self._composer, self._control_records, self._tx_delays,
@@ -564,7 +566,7 @@ class Link:
                     self._record_heard(event)
                 case PduPlaced():
                     self._asking.placed(event)
-                    if self._routes.is_auto:
+                    if self._routes.tells_links:
                         self._note_link(event)
                     self._answers.heard(event.read.pdu.src, event.number % PDU_NUMBERS)
                 case Newcomer():

@@ -15,6 +15,8 @@ FAR = 255
 """The reach of a robot that does not know how far the others are."""
 ANYBODY = BROADCAST
 """In a GRANT: any robot that has no turn."""
+LAST_PLAN = ((0, 0),)
+"""The turns of a GRANT after which there are no rounds any more."""
 _WANT = struct.Struct(">BI")
 WANT_SIZE = 2 + _WANT.size
 """Octets of a WANT record."""

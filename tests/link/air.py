@@ -95,10 +95,13 @@ class Air:
         for node_id in ids:
             self.join(node_id, (joins or {}).get(node_id, 0.0), (ppm or {}).get(node_id, 0.0))
 
+    def make(self, node_id):
+        """The access policy of a robot."""
+        return make_access(self.params, node_id, self.traits, self.longest_s, Random(node_id))
+
     def join(self, node_id, at=0.0, ppm=0.0):
         """Switch a robot on."""
-        access = make_access(self.params, node_id, self.traits, self.longest_s, Random(node_id))
-        node = self.nodes[node_id] = Node(node_id, access, at, ppm)
+        node = self.nodes[node_id] = Node(node_id, self.make(node_id), at, ppm)
         node.phase = at + (0.0 if self.traits.is_lockstep else self.rng.uniform(0, LOOK_S))
         self._look_next(node, node.phase)
         return node

@@ -1,7 +1,7 @@
 """An air of bursts and pulses, for the policy `auction`: each burst tells what comes next."""
 
 from sdrlinkd.link import Sensed
-from sdrlinkd.link.access import Waiting, want_of
+from sdrlinkd.link.access import Waiting, make_auction, want_of
 from sdrlinkd.wire import Want
 from tests.link.air import Air
 from tests.link.radios import DETECT_S, LOCKSTEP, params
@@ -20,6 +20,10 @@ class PulsingAir(Air):
         """When something else sent energy as short as a pulse, in true time."""
         self._wants = {}
         super().__init__(range(n), params("auction", range(n)), FAST, seed, **more)
+
+    def make(self, node_id):
+        """The auction itself, whoever hears whom."""
+        return make_auction(self.params, node_id, self.traits)
 
     def waiting(self, node):
         if not node.waiting:
@@ -45,7 +49,8 @@ class PulsingAir(Air):
         read = [each for each in done if self._reads(node, each, each.end)]
         super()._tell(node)
         for burst in read:
-            node.access.take_want(self._wants[burst.src, burst.begin], node.clock(burst.begin))
+            want = self._wants[burst.src, burst.begin]
+            node.access.take_want(burst.src, want, node.clock(burst.begin))
 
     def sensed(self, node):
         carrier = super().sensed(node)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import Qos, Sensed
-from sdrlinkd.link.access import Contest, Waiting, Wish, make_access, n_bits
+from sdrlinkd.link.access import Contest, Waiting, Wish, make_access, make_auction, n_bits
 from sdrlinkd.wire import Want
 from tests.laws import law
 from tests.link.pulsing import FAST, PulsingAir
@@ -156,7 +156,7 @@ def test_one_that_counts_from_another_burst_disturbs_until_the_next_one():
 
     def burst(end):
         access.heard(2, end - 0.004, False)
-        access.take_want(Want(2, 3, 0, 0, 200, 0), end - 0.004)
+        access.take_want(2, Want(2, 3, 0, 0, 200, 0), end - 0.004)
         sensed = Sensed(end + 1e-4, end, end - 0.004, end, end - 0.004)
         access.slot(Wish(end + 1e-4 + FAST.lead_s, Qos.BULK, SHORT_S, sensed))
 
@@ -305,11 +305,26 @@ def test_nobody_waits_for_ever(most):
     air.assert_nobody_clashes()
 
 
+def test_who_is_next_with_something_more_urgent_needs_no_contest_with_itself():
+    """A robot that fills the air with bulk has something urgent now and then; nobody else sends."""
+    air = make_air(3, 5)
+    for _ in range(600):
+        air.offer(0, 0.0, Qos.BULK, LONGEST_S)
+    for i in range(40):
+        air.offer(0, SETTLED_S + 0.041 * i, Qos.URGENT, SHORT_S)
+    air.run(4.0)
+    # The rest of a burst, and a quiet hand-over: two mini-slots.
+    most_s = LONGEST_S + air.nodes[0].access.pause_s + 2 * FAST.react_s
+    waits = waits_of(air, Qos.URGENT, 0.0)
+    assert len(waits) == 40
+    assert max(waits) <= most_s
+
+
 @pytest.mark.parametrize(("priority", "challenges"), [(10, False), (64, False), (100, True)])
 def test_priority_counts_in_a_class(priority, challenges):
     access = make_access(params("auction", [1, 2]), 1, FAST, LONGEST_S, Random(1))
     access.heard(2, 0.99, False)
-    access.take_want(Want(2, Qos.DEFAULT, 64, 0, 9, 0), 0.99)
+    access.take_want(2, Want(2, Qos.DEFAULT, 64, 0, 9, 0), 0.99)
     now, first = 1.0, None
     while first is None and now < 1.01:
         sensed = Sensed(now, 1.0, 0.99, 1.0, 0.99)
@@ -326,7 +341,7 @@ def test_a_burst_that_does_not_leave_was_none():
     for has_left in (True, False):
         access = make_access(params("auction", [1, 2]), 1, FAST, LONGEST_S, Random(1))
         access.heard(2, 0.9, False)
-        access.take_want(Want(2, Qos.BULK, 0, 0, 0, 0), 0.9)
+        access.take_want(2, Want(2, Qos.BULK, 0, 0, 0, 0), 0.9)
 
         def look(now, end, at, access=access):
             sensed = Sensed(now, end, at, end, at)
@@ -340,7 +355,7 @@ def test_a_burst_that_does_not_leave_was_none():
             assert access.own_end < 1.0
         look(1.0105, 0.95, 0.9)
         access.heard(2, 1.02, False)
-        access.take_want(Want(2, Qos.BULK, 0, 0, 0, 0), 1.02)
+        access.take_want(2, Want(2, Qos.BULK, 0, 0, 0, 0), 1.02)
         now, slot = 1.03, None
         while slot is None:
             slot = look(now, 1.03, 1.02)
@@ -360,14 +375,14 @@ events = st.one_of(
 @law()
 @given(st.lists(events, max_size=40))
 def test_whatever_is_heard_slots_are_sound(given_events):
-    access = make_access(params("auction", [1, 2, 3]), 1, FAST, LONGEST_S, Random(1))
+    access = make_auction(params("auction", [1, 2, 3]), 1, FAST)
     now, sensed = 1.0, Sensed(1.0, 0.0)
     for kind, *fields in given_events:
         now += 0.0007
         if kind == "heard":
             access.heard(fields[0], now, fields[1])
         elif kind == "want":
-            access.take_want(Want(fields[0], fields[1], fields[2], 0, 5, 5), now)
+            access.take_want(fields[0], Want(fields[0], fields[1], fields[2], 0, 5, 5), now)
         elif kind == "not_sent":
             access.not_sent(fields[0])
         else:
@@ -392,7 +407,7 @@ def test_who_takes_no_part_is_told_of():
         for pdu in range(3):
             access.heard(2, 0.1 * n, False)
             if not pdu:
-                access.take_want(Want(2, 3, 0, 0, 5, 0), 0.1 * n)
+                access.take_want(2, Want(2, 3, 0, 0, 5, 0), 0.1 * n)
         access.heard(3, 0.1 * n + 0.05, False)
     (notice,) = access.notices(4.0)
     assert notice.startswith("robot 3 takes no part in the auction")
@@ -404,5 +419,5 @@ def test_others_tell_of_who_takes_part(policy):
     """Robot 2 does, and this robot uses another policy. With tdma, it lacks a schedule."""
     access = make_access(params(policy, [1, 2]), 1, FAST, LONGEST_S, Random(1))
     assert not [each for each in access.notices(1.0) if "auction" in each]
-    access.bids(2, 1.0)
+    access.take_want(2, Want(2, 3, 0, 0, 5, 0), 1.0)
     assert [each for each in access.notices(2.0) if "robot 2 takes part in an auction" in each]

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import Qos, Sensed
 from sdrlinkd.link.access import (
-    LEAST_ROOM,
     Apart,
     Due,
+    Grants,
     Ticks,
     Times,
     Waiting,
@@ -366,9 +366,9 @@ def test_a_plan_fits_into_the_room_that_each_pdu_has(links):
     while robot.access.slot(wish) is None:
         now += 1e-3
         wish = wish._replace(earliest=now, sensed=Sensed(now, now))
-    told = robot.access.told(now, PDU_S, LEAST_ROOM)
+    told = robot.access.told(now, PDU_S, Grants.least_room)
     assert len(told[1].turns) > 8
-    assert len(build_records(told)) + spare <= LEAST_ROOM
+    assert len(build_records(told)) + spare <= Grants.least_room
 
 
 def test_requests_that_do_not_fit_beside_a_plan_wait_for_the_next_pdu():
@@ -379,11 +379,11 @@ def test_requests_that_do_not_fit_beside_a_plan_wait_for_the_next_pdu():
     relay.take_grant(1, Grant(1, 2, 1000, tuple((node, 10) for node in [2, *far])), 5.0)
     wants = [want_of(node, Waiting(Qos.BULK, 0, 0.0, 0.1)) for node in far]
     for want in wants:
-        relay.take_want(want, 5.0)
+        relay.take_want(want.node, want, 5.0)
     told = []
     while relay.must_tell:
-        records = relay.told(5.001, PDU_S, LEAST_ROOM)
-        assert len(build_records(records)) <= LEAST_ROOM
+        records = relay.told(5.001, PDU_S, Grants.least_room)
+        assert len(build_records(records)) <= Grants.least_room
         told.append(records)
     assert isinstance(told[0][1], Grant)
     assert len(told) > 1
@@ -433,7 +433,7 @@ def test_what_is_expected_starves_nobody(node, every_s, has_bulk):
         for other in (2, 3, 4):
             root.heard(other, now, False)
         if has_bulk:
-            root.take_want(want_of(3, Waiting(Qos.BULK, 0, 1.0, 1.0)), now)
+            root.take_want(3, want_of(3, Waiting(Qos.BULK, 0, 1.0, 1.0)), now)
         next_at = every_s * (1 + now // every_s)
         dues = tuple(
             Due(node, Qos.URGENT, next_at + n * every_s, PDU_S) for n in range(int(0.1 / every_s))
@@ -442,7 +442,7 @@ def test_what_is_expected_starves_nobody(node, every_s, has_bulk):
         if slot is None:
             now += STEP_S
             continue
-        _, grant = root.told(slot.start, PDU_S, LEAST_ROOM)
+        _, grant = root.told(slot.start, PDU_S, Grants.least_room)
         root.sent(slot.start + PDU_S, None)
         begin = slot.start + 1e-6 * grant.begins_us
         for turn in TIMES.ticks.round(grant.number, begin, grant.turns).turns:
@@ -489,7 +489,7 @@ def test_whatever_is_told_turns_stay_within_bounds(events, own_id):
             at = now - 0.003 if number % 2 else now
             access.take_grant(src, Grant(number, reach, begins_us, tuple(turns)), at)
         elif kind == "want":
-            access.take_want(Want(src, fields[1], 64, 1, *fields[2:]), now)
+            access.take_want(src, Want(src, fields[1], 64, 1, *fields[2:]), now)
         elif kind == "of":
             access.told_of(src, now, fields[1] % 4)
         else:

@@ -1,5 +1,7 @@
 """Late bursts are sent again: in order, with higher ages, and never lost silently."""
 
+import math
+
 import pytest
 
 from sdrlinkd.link import (
@@ -46,6 +48,10 @@ class Doorkeeper:
     others_follow = False
     keeps_schedule = False
     by_request = by_auction = None
+    tells_at = math.inf
+
+    def know_links(self, edges):
+        pass
 
     def slot(self, wish):
         return self.slots.pop(0)

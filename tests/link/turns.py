@@ -167,7 +167,7 @@ class Team:
             elif name == "Grant":
                 access.take_grant(src.id, record, at)
             else:
-                access.take_want(record, at)
+                access.take_want(src.id, record, at)
 
     def clashes(self, since_s=0.0):
         """Pairs of bursts of which somebody hears both, less than a turnaround apart."""

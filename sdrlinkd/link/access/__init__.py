@@ -4,11 +4,12 @@ This package holds the access policies, each a state machine over the link's clo
 that fits the radio. It never reads a message, and decides only when to send.
 """
 
-from sdrlinkd.link.access.auction import LEAST_BID_ROOM, Auction
 from sdrlinkd.link.access.auction import PATIENCE as AUCTION_PATIENCE
+from sdrlinkd.link.access.auction import Auction
 from sdrlinkd.link.access.auto import Settled, may_share, percent, settle
 from sdrlinkd.link.access.base import Access, Slot, Wish
 from sdrlinkd.link.access.by_auction import ByAuction
+from sdrlinkd.link.access.by_hearing import BACK_S, ByHearing
 from sdrlinkd.link.access.by_request import ByRequest
 from sdrlinkd.link.access.choice import (
     CLOCK_ERROR_S,
@@ -17,13 +18,14 @@ from sdrlinkd.link.access.choice import (
     MARGIN_S,
     check_access,
     make_access,
+    make_auction,
 )
 from sdrlinkd.link.access.contest import Contest, n_bits
 from sdrlinkd.link.access.csma import STEPS as CSMA_STEPS
 from sdrlinkd.link.access.csma import WINDOWS as CSMA_WINDOWS
 from sdrlinkd.link.access.csma import Csma
 from sdrlinkd.link.access.free import Free
-from sdrlinkd.link.access.grant import LEAST_ROOM, Grants
+from sdrlinkd.link.access.grant import Grants
 from sdrlinkd.link.access.idle import idle_words
 from sdrlinkd.link.access.minislot import LEVELS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
@@ -40,12 +42,11 @@ from sdrlinkd.link.access.turns import ALMOST_S, Ticks
 __all__ = [
     "ALMOST_S",
     "AUCTION_PATIENCE",
+    "BACK_S",
     "CLOCK_ERROR_S",
     "CSMA_STEPS",
     "CSMA_WINDOWS",
     "FORGET_S",
-    "LEAST_BID_ROOM",
-    "LEAST_ROOM",
     "LEAST_TURNS",
     "LEVELS",
     "LISTEN_S",
@@ -59,6 +60,7 @@ __all__ = [
     "Apart",
     "Auction",
     "ByAuction",
+    "ByHearing",
     "ByRequest",
     "Contest",
     "Csma",
@@ -78,6 +80,7 @@ __all__ = [
     "check_access",
     "idle_words",
     "make_access",
+    "make_auction",
     "may_share",
     "n_bits",
     "percent",

@@ -38,8 +38,6 @@ DISTURBED_S = 1.0
 First it is until the next burst, from which a robot that just came into range counts as well."""
 MUTE = 20
 """Bursts in sequence without a WANT from which a robot takes no part. Repeats have none."""
-LEAST_BID_ROOM = WANT_SIZE + 32
-"""Octets for an entry that a PDU must have: for a WANT, and for a part of a message."""
 PAUSE_S = 0.05
 """Time in s without a query after which a robot had nothing to send meanwhile."""
 
@@ -52,6 +50,8 @@ class Auction(BusyChannel):
     """
 
     others_follow = True
+    least_room = WANT_SIZE + 32
+    """For a WANT, and for a part of a message."""
 
     def __init__(
         self, own_id: int, nodes: Sequence[int], minislot_s: float, detect_s: float
@@ -106,7 +106,7 @@ class Auction(BusyChannel):
 
     @property
     def lacks(self) -> str:  # type: ignore[override]
-        """A quiet air, while something disturbs the pulses."""
+        """A quiet air, if something disturbs the pulses."""
         return "an air without other pulses" if self._is_disturbed else ""
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # the same for all classes
@@ -139,7 +139,7 @@ class Auction(BusyChannel):
         n_unseen = self._wants.n_bursts - self._seen_bursts
         self._seen_bursts = self._wants.n_bursts
         if n_unseen > 1 or (not has_seen and place.n_before):
-            # A hand-over has passed in which we may have been next.
+            # We may have been next in a hand-over that has passed.
             self._wants.told(self._own_id, None, earliest)
         if rounds.go_on(place, carrier_end):
             self._nobody_came(place.begin, carrier_end)
@@ -147,22 +147,19 @@ class Auction(BusyChannel):
         if place.number == 0:
             return self._challenge(wish, place)
         if not place.is_contested:
-            first = self._wants.first(carrier_end)
-            is_next = first is not None and first.node == self._own_id
-            if place.is_first and is_next and not self._wants.is_unsure(self._own_id, earliest):
-                return self._burst(wish, place.start)
-            return None
+            return self._burst(wish, place.start) if self._is_next(wish, place) else None
         return self._in_contest(wish, place, sensed.pulses)
 
     def told(self, waiting: Waiting | None, start: float) -> None:
         """Note what our burst at `start` tells; None: that we want nothing more."""
         self._wants.told(self._own_id, waiting, start)
 
-    def take_want(self, want: Want, at: float) -> None:
-        """Take what a robot told in a burst at `at`."""
-        self._wants.told(want.node, waiting_of(want), at)
-        self._told_at = max(self._told_at, at)
-        self._mute.clear(want.node)
+    def take_want(self, src: int, want: Want, at: float) -> None:
+        """Take what a robot told in a burst at `at`; nobody speaks for others here."""
+        if want.node == src:
+            self._wants.told(src, waiting_of(want), at)
+            self._told_at = max(self._told_at, at)
+            self._mute.clear(src)
 
     def sent(self, end: float, src: int | None) -> None:
         """Remember our own burst, which we do not hear."""
@@ -241,16 +238,23 @@ class Auction(BusyChannel):
         has_waited = self._has_waited(PATIENCE)
         contest = Contest(qos, self._rank, len(self._nodes), has_waited=has_waited)
         self._contest = place.begin, contest
-        return self._pulse(place.start)
+        # Who is next anyway sends, unless somebody else challenges.
+        return None if self._is_next(wish, place) else self._pulse(place.start)
+
+    def _is_next(self, wish: Wish, place: Place) -> bool:
+        """Whether everybody knows that we are next, unless somebody challenges."""
+        first = self._wants.first(place.idle_since) if place.is_first else None
+        is_known = first is not None and first.node == self._own_id
+        return is_known and not self._wants.is_unsure(self._own_id, wish.earliest)
 
     def _challenges(self, wish: Wish, place: Place) -> bool:
-        now, wants, since = wish.earliest, self._wants, place.idle_since
+        wants, since = self._wants, place.idle_since
         priority = 0 if wish.waiting is None else wish.waiting.priority
         first = wants.first(since) if place.is_first else None
         if first is None or not first.is_before(wish.qos, priority):
             return True
         if first.node == self._own_id:
-            return wants.is_unsure(self._own_id, now)
+            return wants.is_unsure(self._own_id, wish.earliest)
         if first.qos > Qos.URGENT and self._has_waited(STARVED):
             return True
         is_unknown = wants.of(self._own_id, since) is None

@@ -8,9 +8,10 @@ from sdrlinkd.link.access.by_auction import ByAuction
 from sdrlinkd.link.access.by_request import ByRequest
 from sdrlinkd.link.access.requests import Due, Waiting
 from sdrlinkd.link.access.sightings import Sightings
+from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.traits import Sensed
-from sdrlinkd.wire import Frame
+from sdrlinkd.wire import Frame, Grant, Want
 
 NEVER = -1.0
 MOST_ON_THEIR_WAY = 8
@@ -101,6 +102,18 @@ class Access(Protocol):
         """Time when our own last burst ends."""
 
     @property
+    def least_room(self) -> int:
+        """Octets for records that a PDU must have; 0 if the policy tells none."""
+
+    @property
+    def needs_links(self) -> bool:
+        """Whether the policy has to know who hears whom, so that LSAs must tell it."""
+
+    @property
+    def tells_at(self) -> float:
+        """Time in s from which the policy itself has something to tell; infinity: nothing."""
+
+    @property
     def by_request(self) -> ByRequest | None:
         """The policy itself, if it gives turns by request."""
 
@@ -137,8 +150,14 @@ class Access(Protocol):
     def beacon(self, src: int, at: float) -> None:
         """Note a beacon that came at `at` directly from robot `src`."""
 
-    def bids(self, src: int, at: float) -> None:
-        """Note that robot `src` told at `at` what it wants next, as with an auction."""
+    def take_want(self, src: int, want: Want, at: float) -> None:
+        """Take what a robot wants next, as robot `src` told it in a burst at `at`."""
+
+    def take_grant(self, src: int, grant: Grant, at: float) -> None:
+        """Take the turns that robot `src` told, after a FRAME, in a burst at `at`."""
+
+    def know_links(self, edges: Edges) -> None:
+        """Take the links of the team, as its LSAs tell them."""
 
     def frame(self, start: float) -> Frame | None:
         """The schedule to announce in a burst that leaves at `start`; None: none is kept."""
@@ -163,6 +182,13 @@ class BusyChannel:
     step_s = 0.0
     others_follow = False
     keeps_schedule = False
+    least_room = 0
+    needs_links = False
+
+    @property
+    def tells_at(self) -> float:
+        """Infinity, as there is nothing to tell."""
+        return inf
 
     @property
     def by_request(self) -> ByRequest | None:
@@ -208,9 +234,15 @@ class BusyChannel:
     def beacon(self, src: int, at: float) -> None:
         """Ignore beacons, as no turn depends on them."""
 
-    def bids(self, src: int, at: float) -> None:
-        """Remember that robot `src` takes part in an auction and so uses another policy."""
+    def take_want(self, src: int, want: Want, at: float) -> None:  # noqa: ARG002  # whatever it is
+        """Remember that robot `src` tells what it wants and so uses another policy."""
         self._bidding.add(src, at)
+
+    def take_grant(self, src: int, grant: Grant, at: float) -> None:
+        """Ignore turns; the FRAME before them tells that the other policy is another one."""
+
+    def know_links(self, edges: Edges) -> None:
+        """Ignore the links of the team, as no turn depends on them."""
 
     def frame(self, start: float) -> Frame | None:
         """The schedule to announce: None, as no schedule is kept."""

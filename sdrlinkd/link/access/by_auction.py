@@ -3,7 +3,6 @@
 from typing import Protocol
 
 from sdrlinkd.link.access.requests import Waiting
-from sdrlinkd.wire import Want
 
 
 class ByAuction(Protocol):
@@ -11,6 +10,3 @@ class ByAuction(Protocol):
 
     def told(self, waiting: Waiting | None, start: float) -> None:
         """Note what our burst at `start` tells; None: that we want nothing more."""
-
-    def take_want(self, want: Want, at: float) -> None:
-        """Take what a robot told in a burst at `at`."""

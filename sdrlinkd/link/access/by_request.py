@@ -3,8 +3,7 @@
 from typing import Protocol
 
 from sdrlinkd.link.access.requests import Waiting
-from sdrlinkd.link.paths import Edges
-from sdrlinkd.wire import Grant, Record, Want
+from sdrlinkd.wire import Record, Want
 
 
 class ByRequest(Protocol):
@@ -31,10 +30,6 @@ class ByRequest(Protocol):
         """Time in s for which what is not urgent gives way to urgent messages that are expected."""
 
     @property
-    def tells_at(self) -> float:
-        """Time in s from which the policy itself has something to tell; infinity: nothing."""
-
-    @property
     def must_tell(self) -> bool:
         """Whether our next burst must tell something."""
 
@@ -49,12 +44,3 @@ class ByRequest(Protocol):
 
     def told(self, start: float, length_s: float, room: int) -> list[Record]:
         """What a burst of `length_s` at `start` must tell, in a PDU with `room` octets for it."""
-
-    def take_want(self, want: Want, at: float) -> None:
-        """Take what a robot wants to send, as told directly in a burst at `at`."""
-
-    def take_grant(self, src: int, grant: Grant, at: float) -> None:
-        """Take the turns that robot `src` told, after a FRAME, in a burst at `at`."""
-
-    def know_links(self, edges: Edges) -> None:
-        """Take the links of the team."""

@@ -6,9 +6,11 @@ from random import Random
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link.access.auction import Auction
 from sdrlinkd.link.access.base import Access
+from sdrlinkd.link.access.by_hearing import ByHearing
 from sdrlinkd.link.access.csma import Csma
 from sdrlinkd.link.access.free import Free
 from sdrlinkd.link.access.grant import Grants
+from sdrlinkd.link.access.hearing import Hearing
 from sdrlinkd.link.access.minislot import SECTIONS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
 from sdrlinkd.link.access.round_plan import MOST_TURNS, Times
@@ -30,6 +32,8 @@ MOST_TICKS = 240
 HEARS_SHARE = 0.1
 """grant: most time for which the root waits to hear the last turn, as a share of the budget."""
 LONGEST_ROUND_S = 1.0
+MANY = 3
+"""auction: robots from which some may not hear others that are here."""
 LONGEST_APART_S = 0.1
 """Longest reaction time in s of a radio for which listening before sending makes sense."""
 
@@ -87,13 +91,17 @@ def make_access(
             )
         return MiniSlots(own_id, params.nodes, minislot_s, detect_s)
     if params.policy == "auction":
-        return _make_auction(params, own_id, traits)
+        auction = make_auction(params, own_id, traits)
+        if len(params.nodes) < MANY:
+            return auction
+        grants = _make_grant(params, own_id, traits, longest_burst_s, rng)
+        return ByHearing(auction, grants, Hearing(own_id, params.nodes))
     if params.policy == "grant":
         return _make_grant(params, own_id, traits, longest_burst_s, rng)
     return _make_tdma(params, own_id, traits, longest_burst_s, apart_s, rng)
 
 
-def _make_auction(params: AccessParams, own_id: int, traits: PduLinkTraits) -> Auction:
+def make_auction(params: AccessParams, own_id: int, traits: PduLinkTraits) -> Auction:
     if not traits.pulse_s:
         raise ConfigError(
             f'access.policy: got "auction", but the backend "{traits.kind}" sends no pulses; '

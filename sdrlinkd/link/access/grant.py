@@ -12,35 +12,22 @@ from struct import pack
 
 from sdrlinkd.link.access.base import BusyChannel, Slot, Wish
 from sdrlinkd.link.access.by_request import ByRequest
+from sdrlinkd.link.access.heard_frames import HeardFrames
 from sdrlinkd.link.access.known_rounds import KnownRounds
 from sdrlinkd.link.access.leadership import Leadership
+from sdrlinkd.link.access.open_turns import OpenTurns
 from sdrlinkd.link.access.own_request import OwnRequest
 from sdrlinkd.link.access.planner import PATIENCE_S, Planner
 from sdrlinkd.link.access.requests import Waiting
-from sdrlinkd.link.access.round_plan import MOST_TOLD, Times
-from sdrlinkd.link.access.sightings import Sightings, schedule_notices
+from sdrlinkd.link.access.round_plan import PLAN_SIZE, Times
 from sdrlinkd.link.access.tdma_states import Happens
 from sdrlinkd.link.access.team import Team
-from sdrlinkd.link.access.turns import ALMOST_S, Turn
+from sdrlinkd.link.access.turns import ALMOST_S
 from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
-from sdrlinkd.wire import (
-    ANYBODY,
-    FRAME_SIZE,
-    GRANT_OVERHEAD,
-    TURN_SIZE,
-    WANT_SIZE,
-    Frame,
-    Record,
-    RecordType,
-    crc16,
-)
+from sdrlinkd.wire import ANYBODY, LAST_PLAN, WANT_SIZE, Frame, Record, RecordType, crc16
 from sdrlinkd.wire import Grant as GrantRecord
 from sdrlinkd.wire import Want as WantRecord
-
-PLAN_SIZE = FRAME_SIZE + GRANT_OVERHEAD + MOST_TOLD * TURN_SIZE
-LEAST_ROOM = PLAN_SIZE + WANT_SIZE
-"""Octets for records that a PDU must have: for a plan and a request."""
 
 
 class Grants(BusyChannel):
@@ -50,6 +37,8 @@ class Grants(BusyChannel):
     most urgent messages a longer one. Robots that hear the root tell its plan to those that do not.
     """
 
+    least_room = PLAN_SIZE + WANT_SIZE
+    """For a plan and a request."""
     patience_s = PATIENCE_S
     ahead_s = 0.0
     """How long the last round took: what we ask for now is given after one."""
@@ -61,7 +50,6 @@ class Grants(BusyChannel):
         super().__init__()
         self._own_id = own_id
         self._times = times
-        self._rng = rng
         self._lead_s = lead_s
         self._look_s = look_s
         self._gap_s = gap_s
@@ -69,25 +57,27 @@ class Grants(BusyChannel):
         self.share = times.budget_s / len(nodes) / self.round_s
         micro = [round(1e6 * each) for each in (*times.ticks, times.turn_s, times.budget_s)]
         self._schedule = crc16(pack(">BIIII", RecordType.GRANT, *micro) + bytes(sorted(nodes)))
+        self._frames = HeardFrames(nodes, self._schedule)
         self._team = Team(own_id, nodes)
         begin_s = times.turn_s + times.ticks.guard_s + times.react_s
-        self._leads = Leadership(own_id, self._team, self.round_s, begin_s)
+        self.leads = Leadership(own_id, self._team, self.round_s, begin_s)
+        """Whose plans are kept."""
         self._planner = Planner(own_id, self._team, times)
         self._request = OwnRequest(own_id, times, self.round_s)
         self._rounds = KnownRounds(own_id, times.turn_s, times.root_s)
         self._behind: dict[int, WantRecord] = {}
         """Requests to pass on to the root."""
-        self._tried = -inf, False
-        """The last turn for anybody, as (its begin, whether we use it)."""
-        self._frame: tuple[int, float, Frame] | None = None
-        """The last FRAME, as (who told it, when, what)."""
-        self._strangers, self._outsiders = Sightings(), Sightings()
+        self._open = OpenTurns(rng)
         self._asked_at = -inf  # Or when we heard somebody last.
+        self.ends = False
+        """As the root: whether the next plan is the last one."""
+        self.has_ended = False
+        """Whether it was told or heard."""
 
     @property
     def state(self) -> str:
         """Policy, times, and whose plans are kept, for people."""
-        leads = self._leads
+        leads = self.leads
         doing = "listening for a plan"
         if leads.is_root:
             doing = "planned here"
@@ -105,7 +95,7 @@ class Grants(BusyChannel):
     @property
     def lacks(self) -> str:  # type: ignore[override]
         """A plan, while listening for one, and if one was not heard: no turn is known then."""
-        leads, lacks = self._leads, self._rounds.lacks(self._asked_at)
+        leads, lacks = self.leads, self._rounds.lacks(self._asked_at)
         return "" if leads.is_root else lacks if leads.follows else "a plan"
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # the same for all classes
@@ -124,35 +114,35 @@ class Grants(BusyChannel):
     @property
     def plans(self) -> bool:
         """Whether we are the root."""
-        return self._leads.is_root
+        return self.leads.is_root
 
     @property
     def is_far(self) -> bool:
         """Whether we do not hear the root."""
-        return self._leads.level > 1
+        return self.leads.level > 1
 
     @property
     def tells_at(self) -> float:
         """Time from which we must be asked, as others wait for the plan."""
-        if self._leads.is_root:
+        if self.leads.is_root:
             return self._planner.tells_at - self._look_s
-        if self._must_pass_on() or self._leads.takes_over:
+        if self._must_pass_on() or self.leads.takes_over:
             own = (turn for turn in self._rounds.own_turns() if turn.node == self._own_id)
             return min((turn.begin for turn in own), default=inf) - self._look_s
         return inf
 
     def turn_at(self, earliest: float) -> float:
         """When we may send next, at `earliest` or later, as far as known."""
-        if self._leads.is_root:
+        if self.leads.is_root:
             return max(earliest, self._planner.turn_at)
         for turn in self._rounds.own_turns():
             if turn.end > earliest:
                 return max(earliest, turn.begin)
-        return inf if self._leads.follows else earliest
+        return inf if self.leads.follows else earliest
 
     def slot(self, wish: Wish) -> Slot | None:
         """Our turn, from its begin or from `earliest` on."""
-        earliest, leads = wish.earliest, self._leads
+        earliest, leads = wish.earliest, self.leads
         self._asked_at = max(self._asked_at, wish.sensed.until)
         # While our last burst is on the air, `earliest` is not the present.
         latest = min(earliest, wish.sensed.until + self._lead_s) + self._look_s
@@ -167,7 +157,7 @@ class Grants(BusyChannel):
                 if start >= latest:
                     # Too early: decide at the last query before that start.
                     return None
-                if turn.node == ANYBODY and not self._tries(turn):
+                if turn.node == ANYBODY and not self._open.tries(turn.begin, self._absent()):
                     continue
                 if leads.takes_over and turn.node == self._own_id:
                     leads.begin(start, Happens.LOSES)
@@ -178,13 +168,13 @@ class Grants(BusyChannel):
     @property
     def must_tell(self) -> bool:
         """Whether our next burst tells the plan, or requests of robots behind us."""
-        if self._leads.is_root:
+        if self.leads.is_root:
             return self._planner.tells
         return self._must_pass_on() or bool(self._behind)
 
     def request(self, start: float, left: Waiting | None) -> WantRecord | None:
         """What to ask the root for, unless it knows."""
-        if self._leads.is_root or left is None:
+        if self.leads.is_root or left is None:
             return None
         return self._request.of(left, start)
 
@@ -194,12 +184,14 @@ class Grants(BusyChannel):
 
     def told(self, start: float, length_s: float, room: int) -> list[Record]:
         """The plan of the next round, or the one that we pass on, with requests to pass on."""
-        leads = self._leads
+        leads = self.leads
         if leads.is_root:
             leads.look(start)
             # Until its end, the round of a root that we have taken over from goes on.
             last = self._rounds.last
             grant, made = self._planner.plan(start, length_s, leads.rank[0], last)
+            if self.ends:
+                grant, self.has_ended = grant._replace(turns=LAST_PLAN), True
             self._rounds.made(made)
             return [Frame(self._own_id, 0, self._schedule, 0), grant]
         records: list[Record] = []
@@ -239,38 +231,31 @@ class Grants(BusyChannel):
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """Remember whose plan the next GRANT of this burst tells."""
-        self._frame = None
-        if src not in self._team.nodes or frame.root not in self._team.nodes:
-            # It may be anybody's; those in `nodes` are who share the channel.
-            self._outsiders.add(src, at)
-        elif frame.schedule != self._schedule:
-            self._strangers.add(src, at)
-        else:
-            self._strangers.clear(src)
-            self._frame = src, at, frame
+        self._frames.take(src, frame, at)
 
-    def take_want(self, want: WantRecord, at: float) -> None:
+    def take_want(self, src: int, want: WantRecord, at: float) -> None:  # noqa: ARG002  # or by a relay
         """Take what a robot wants, or pass it on to the root."""
         if want.node not in self._team.nodes or want.node == self._own_id:
             return
-        if self._leads.is_root:
+        if self.leads.is_root:
             self._planner.take(want, at)
-        elif self._team.places(self._leads.root).is_behind(want.node, self._own_id):
+        elif self._team.places(self.leads.root).is_behind(want.node, self._own_id):
             self._behind[want.node] = want
 
     def take_grant(self, src: int, grant: GrantRecord, at: float) -> None:
         """Follow a plan of the best root known, as robot `src` told it."""
-        if self._frame is None or self._frame[:2] != (src, at):
+        frame = self._frames.of(src, at)
+        if frame is None:
             return
-        frame = self._frame[2]
         since = at - 1e-6 * frame.phase_us
         found = self._times.ticks.round(grant.number, since + 1e-6 * grant.begins_us, grant.turns)
         if not found.is_sound(at, 2 * self.round_s):
             return
         has_turn = any(turn.node == self._own_id for turn in found.turns)
-        follows, is_new = self._leads.take(src, frame, grant.reach, at, has_turn=has_turn)
+        follows, is_new = self.leads.take(src, frame, grant.reach, at, has_turn=has_turn)
         if is_new:
             self._begin_anew()
+        self.has_ended = follows and grant.turns == LAST_PLAN
         last = self._rounds.last
         if follows and self._rounds.take(since, grant, found):
             self._request.given(found)
@@ -279,7 +264,20 @@ class Grants(BusyChannel):
 
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that keep another schedule."""
-        return schedule_notices(self._outsiders, self._strangers, self.state, now)
+        return self._frames.notices(self.state, now)
+
+    def begin(self, wish: Wish, start: float) -> Slot:
+        """Plan from our burst at `start` on, where nobody did so before."""
+        self.leads.begin(start, Happens.BEGINS)
+        self._begin_anew()
+        self._planner.begin(start)
+        return self._planner.slot(wish._replace(earliest=start))
+
+    def end(self) -> None:
+        """Plan and follow nobody any more."""
+        self.leads.end()
+        self._begin_anew()
+        self.ends = self.has_ended = False
 
     def _begin_anew(self) -> None:
         """Forget the rounds of another root."""
@@ -288,13 +286,9 @@ class Grants(BusyChannel):
 
     def _must_pass_on(self) -> bool:
         """Whether a robot in the plan has to hear it from us, and has not yet."""
-        places = self._team.places(self._leads.root)
-        return self._leads.follows and self._rounds.must_pass_on(places)
+        places = self._team.places(self.leads.root)
+        return self.leads.follows and self._rounds.must_pass_on(places)
 
-    def _tries(self, turn: Turn) -> bool:
-        """Whether to send in a turn for anybody: at random, as others may do so, too."""
-        if self._tried[0] != turn.begin:
-            here = {*self._rounds.nodes(), self._leads.root}
-            absent = sum(node not in here for node in self._team.nodes)
-            self._tried = turn.begin, self._rng.random() * absent < 1
-        return self._tried[1]
+    def _absent(self) -> int:
+        """How many robots have no turns of their own."""
+        return len({*self._team.nodes} - {*self._rounds.nodes(), self.leads.root})

@@ -9,7 +9,7 @@ turn longer than the one before it, until one of them plans.
 from math import inf
 
 from sdrlinkd.link.access.steps import after
-from sdrlinkd.link.access.tdma_states import STEPS, Happens, State
+from sdrlinkd.link.access.tdma_states import GRANT_STEPS, Happens, State
 from sdrlinkd.link.access.team import PRESENT_S, Team
 from sdrlinkd.link.traits import Sensed
 from sdrlinkd.wire import FAR, Frame
@@ -79,7 +79,7 @@ class Leadership:
         if not self.follows:
             return False
         before = sum(node < self._own_id and node != self.root for node in self._team.present(now))
-        if not self._is_lost(now - before * self._turn_s) or not self._is_silent(now, sensed):
+        if not self.is_lost(now - before * self._turn_s) or not self._is_silent(now, sensed):
             return False
         self._lost = self.root, self.level, now + 2 * PRESENT_S
         self.begin(now, Happens.LOSES)
@@ -87,10 +87,31 @@ class Leadership:
 
     def begin(self, now: float, happens: Happens) -> None:
         """Be the root from now on."""
-        self.role = after(STEPS, self.role, happens)
+        self.role = after(GRANT_STEPS, self.role, happens)
         self.root, self.level, self._parent = self._own_id, 0, self._own_id
         self._better_since = inf
         self.look(now)
+
+    def end(self) -> None:
+        """Neither plan nor follow from now on."""
+        self.role = after(GRANT_STEPS, self.role, Happens.ENDS)
+        self.root, self.level, self._parent = self._own_id, 0, self._own_id
+        self.rank, self._better_since = (FAR, self._own_id), inf
+
+    def place(self, now: float) -> int:
+        """How many robots that are here would be better roots than we."""
+        here = self._team.present(now)
+        own = self._own_rank(now)
+        everybody = {self._own_id, *here}
+        return sum(
+            (self._team.reach(node, everybody - {node}), node) < own for node in here
+        )  # fmt: skip
+
+    def is_lost(self, now: float) -> bool:
+        """Whether the root that we follow has told no plan for long."""
+        # Plans without a turn of ours are not always passed on to us.
+        lost_s = self.level * LOST_ROUNDS * self._round_s if self._has_turn else LISTEN_S
+        return self.follows and now > self._told_at + lost_s
 
     def look(self, now: float) -> None:
         """As the root: note how far the others are."""
@@ -114,8 +135,8 @@ class Leadership:
         if not is_new:
             if level < self.level or src == self._parent:
                 self.level, self._parent = level, src
-        elif self.role is State.LISTENING or rank < self.rank or self._is_lost(at):
-            self.role = after(STEPS, self.role, Happens.FOLLOWS)
+        elif self.role is State.LISTENING or rank < self.rank or self.is_lost(at):
+            self.role = after(GRANT_STEPS, self.role, Happens.FOLLOWS)
             self.root, self.level, self._parent = root, level, src
         else:
             return False, False
@@ -129,12 +150,6 @@ class Leadership:
 
     def _own_rank(self, now: float) -> tuple[int, int]:
         return self._team.reach(self._own_id, self._team.present(now)), self._own_id
-
-    def _is_lost(self, now: float) -> bool:
-        """Whether the root that we follow has told no plan for long."""
-        # Plans without a turn of ours are not always passed on to us.
-        lost_s = self.level * LOST_ROUNDS * self._round_s if self._has_turn else LISTEN_S
-        return self.follows and now > self._told_at + lost_s
 
     def _is_silent(self, now: float, sensed: Sensed) -> bool:
         """Whether nobody has sent for a round, as the root's team would."""

@@ -56,6 +56,8 @@ class Planner:
     def begin(self, now: float) -> None:
         """Begin to plan, with our turn at `now`."""
         self.turn_at, self._turn_end, self.tells = now, -inf, True
+        # What was asked for at another time counts no more.
+        self._requests = Requests()
 
     def sent(self, end: float) -> None:
         """Note that a burst of ours ends at `end`; until the next plan, our turn goes on."""

@@ -15,7 +15,7 @@ from sdrlinkd.link.access.reuse import Stage, beside, told
 from sdrlinkd.link.access.team import Places
 from sdrlinkd.link.access.turns import Ticks
 from sdrlinkd.link.qos import MIDDLE_PRIORITY, Qos
-from sdrlinkd.wire import ANYBODY, MAX_AIR
+from sdrlinkd.wire import ANYBODY, FRAME_SIZE, GRANT_OVERHEAD, MAX_AIR, TURN_SIZE
 
 MOST_TURNS = 8
 """Most robots with a turn in one round, beside the root."""
@@ -23,6 +23,8 @@ SPARE_TURNS = 2
 """Turns of a round beyond one for each robot: for those who are not here, and a second one."""
 MOST_TOLD = MOST_TURNS + SPARE_TURNS
 """Most turns in a plan."""
+PLAN_SIZE = FRAME_SIZE + GRANT_OVERHEAD + MOST_TOLD * TURN_SIZE
+"""Most octets of a plan."""
 LEAST_TURNS = MOST_TOLD - 1 - 2
 """Least turns of a round in which two robots share the budget; one turn may be for anybody."""
 STANDS = 0.5

@@ -15,6 +15,8 @@ continues by its own clock, which still nearly agrees, and the lowest robot beco
         │                         └──┘                     │  └───┘
         └──────────────────────────────────────────────────┘
                                FOLLOWS
+
+`grant` has the same states. There, ENDS leads back to LISTENING from everywhere.
 """
 
 from collections.abc import Mapping
@@ -41,6 +43,8 @@ class Happens(Enum):
     """The robot keeps its own schedule in the phase of another, whose robots will follow it."""
     FOLLOWS = auto()
     """The robot hears of a lower root, or of its root over fewer hops."""
+    ENDS = auto()
+    """The team goes on without a schedule."""
     LOSES = auto()
     """The robot has had no news of its root for FORGET_S."""
 
@@ -53,4 +57,9 @@ STEPS: Mapping[tuple[State, Happens], State] = {
     (State.ROOT, Happens.FOLLOWS): State.FOLLOWER,
     (State.FOLLOWER, Happens.FOLLOWS): State.FOLLOWER,
     (State.FOLLOWER, Happens.LOSES): State.ROOT,
+}
+
+GRANT_STEPS: Mapping[tuple[State, Happens], State] = {
+    **STEPS,
+    **{(state, Happens.ENDS): State.LISTENING for state in State},
 }

@@ -9,8 +9,11 @@ from sdrlinkd.link.access.reuse import NONE_APART, Apart
 from sdrlinkd.link.paths import Edges, distances
 from sdrlinkd.wire import FAR
 
-DOUBTFUL = 4.0
-"""Cost of a link that was heard lately, and that LSAs do not tell."""
+DOUBTFUL, DOUBTED_S = 4.0, 1.5
+"""Cost of a link that was heard lately, and that LSAs do not tell; and for how long in s it counts,
+as it is one that is new or that has ended."""
+FRESH_S = 0.5
+"""How often, in s, links are forgotten of which nothing was heard."""
 SETTLED_S = 5.0
 """Time in s for which the same robots must have heard each other before two may send at once."""
 PRESENT_S = 3.5
@@ -115,7 +118,7 @@ class Team:
 
     def _link(self, one: int, other: int, at: float) -> None:
         link = min(one, other), max(one, other)
-        if link not in self._link_at or at > self._expired_at + PRESENT_S:
+        if link not in self._link_at or at > self._expired_at + FRESH_S:
             self._expired_at = at
             fresh = {each: told for each, told in self._link_at.items() if told > at - PRESENT_S}
             self._link_at = fresh
@@ -129,9 +132,13 @@ class Team:
     def _edges(self) -> Edges:
         known = {node: dict(links) for node, links in self._lsa_edges.items()}
         edges: defaultdict[int, dict[int, float]] = defaultdict(dict, known)
-        for one, other in self._link_at:
-            # If they have LSAs that do not name each other, these know better.
-            cost = DOUBTFUL if one in known and other in known else 1.0
+        for (one, other), at in self._link_at.items():
+            cost = 1.0
+            if one in known and other in known:
+                # If they have LSAs that do not name each other, these know better.
+                if at < self._expired_at - DOUBTED_S:
+                    continue
+                cost = DOUBTFUL
             edges[one].setdefault(other, cost)
             edges[other].setdefault(one, cost)
         return edges

@@ -1,6 +1,7 @@
 """The routes of a robot as one object: what it relays, whom it names, and what it answers."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 from sdrlinkd.link.paths import Edges
@@ -48,7 +49,10 @@ class Routes:
         """Whether this robot relays any PDUs."""
         self.lifespan_s = params.lifespan_s
         """Longest wait in s of a PDU to be relayed."""
+        self._draw_links = partial(Links, own_id, room, draw)
         self._links = Links(own_id, room, draw if self.is_auto else lambda: 0)
+        self.tells_links = self.is_auto
+        """Whether this robot tells whom it hears."""
         self._named = Named(own_id)
         self._forwarding = Forwarding(own_id, self._links)
         self._taken_version = 0
@@ -56,6 +60,11 @@ class Routes:
         """Since when answers are owed, by source."""
         self._newest: dict[int, int] = {}
         """The highest PDU number that was heard of each source."""
+
+    def tell_links(self) -> None:
+        """Tell whom we hear, whatever is relayed."""
+        if not self.tells_links:
+            self.tells_links, self._links = True, self._draw_links()
 
     def set_needed_snr(self, needed_db: float) -> None:
         """Set the SNR in dB that the most robust MCS in use needs."""
@@ -87,9 +96,11 @@ class Routes:
         is_direct: bool, has_messages: bool,
     ) -> None:  # fmt: skip
         """Note a PDU that was not heard before; `is_direct`: neither relayed nor repeated."""
-        if not self.is_auto or src == self._own_id:
+        if not self.tells_links or src == self._own_id:
             return
         self._links.qualities.placed(src, number, at, snr_db, is_direct=is_direct)
+        if not self.is_auto:
+            return
         self._newest[src] = max(number, self._newest.get(src, number))
         if has_messages and (dst == self._own_id or self._named.is_named((src, dst), at)):
             self._owed.setdefault(src, at)
@@ -106,10 +117,11 @@ class Routes:
         """Take a record that robot `src` told directly; returns PDUs that came before, and are to
         be forwarded after all.
         """
-        if not self.is_auto:
-            return []
         if isinstance(record, Lsa):
-            self._links.take(src, record, at)
+            if self.tells_links:
+                self._links.take(src, record, at)
+        elif not self.is_auto:
+            return []
         elif isinstance(record, Need):
             self._forwarding.answered(src, record, at)
             return self._named.needed(record, at)
@@ -119,7 +131,7 @@ class Routes:
 
     def newcomer(self, src: int, at: float) -> None:
         """Begin anew with a robot that was heard for the first time, or has restarted."""
-        if self.is_auto:
+        if self.tells_links:
             self._newest.pop(src, None)
             self._owed.pop(src, None)
             self._links.newcomer(src, at)
@@ -139,9 +151,10 @@ class Routes:
 
     def look(self, now: float) -> list[Again]:
         """Do what is due at `now`; returns the PDUs that are sent again, as nobody answered."""
+        if self.tells_links:
+            self._links.look(now)
         if not self.is_auto:
             return []
-        self._links.look(now)
         self._named.expire(now)
         return self._forwarding.look(now)
 
@@ -184,7 +197,7 @@ class Routes:
 
     def digest(self) -> Lsa | None:
         """The record that stands for the LSAs of the team, to be sent beside a BEACON."""
-        return self._links.digest() if self.is_auto else None
+        return self._links.digest() if self.tells_links else None
 
     def begin_anew(self) -> None:
         """Go on with another clock; nothing that was heard before counts."""
@@ -197,7 +210,7 @@ class Routes:
     def report(self, now: float) -> RoutesReport:
         """The links of the team, and who forwards what."""
         return RoutesReport(
-            robots=self._links.report(now) if self.is_auto else [],
+            robots=self._links.report(now) if self.tells_links else [],
             flows=self._forwarding.report(now) if self.is_auto else [],
             going_around=sorted(self._forwarding.around),
         )

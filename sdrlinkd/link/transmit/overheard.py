@@ -20,8 +20,6 @@ class Overheard:
     ) -> None:
         self._knows = knows
         self._access, self._rate = fit.settled.access, fit.rate
-        self._by_request = fit.settled.access.by_request
-        self._by_auction = fit.settled.access.by_auction
         self._forecasts = forecasts
         self._own_id = own_id
         self._has_control = has_control
@@ -34,7 +32,7 @@ class Overheard:
         if not is_relayed and self._knows(src, at):
             self._rate.heard(src, at)
         qos = CLASSES[pdu.qos]
-        by_request = self._by_request is not None
+        by_request = self._access.by_request is not None
         uses = self._access.others_follow or (by_request and not is_relayed)
         if not uses or qos > Qos.LATENCY or src == self._own_id:
             return
@@ -51,7 +49,7 @@ class Overheard:
 
     def forwarding(self, pdu: Pdu, at: float) -> None:
         """Note a PDU that we forward: we can ask for the air for the next one in advance."""
-        if self._by_request is None:
+        if self._access.by_request is None:
             return
         for entry in pdu.entries:
             if not entry.index and entry.total:
@@ -70,14 +68,7 @@ class Overheard:
             self._access.beacon(src, at)
         elif isinstance(record, Frame):
             self._access.take_frame(src, record, at)
-        elif self._by_auction is not None and isinstance(record, Want):
-            # Nobody speaks for others here.
-            if record.node == src:
-                self._by_auction.take_want(record, at)
-        elif self._by_request is None:
-            if isinstance(record, Want):
-                self._access.bids(src, at)
         elif isinstance(record, Grant):
-            self._by_request.take_grant(src, record, at)
+            self._access.take_grant(src, record, at)
         elif isinstance(record, Want):
-            self._by_request.take_want(record, at)
+            self._access.take_want(src, record, at)

@@ -10,7 +10,6 @@ from math import inf
 
 from sdrlinkd.link.access import ALMOST_S, ByRequest, Due, Slot, Waiting, together
 from sdrlinkd.link.packing import BuiltPdu, Composer, PiggybackRecords
-from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import MIDDLE_PRIORITY, Qos
 from sdrlinkd.link.queue import Outbox
 from sdrlinkd.link.repeat import Answers
@@ -80,18 +79,10 @@ class OwnTurns:
             for node, forecast in self._forecasts.of_team(now, now + 2 * self._access.round_s)
         )
 
-    def tells_at(self, earliest: float) -> float:
-        """When there is something to tell, though nothing waits; infinity: never.
-
-        That is a plan, or from `earliest` on, a request for what will come soon.
-        """
+    def asks_at(self, earliest: float) -> float:
+        """From `earliest` on, when to ask for what will come soon; infinity: nothing will."""
         at = self._access.turn_at(earliest)
-        asks_at = at if at < inf and self._soon(at) else inf
-        return min(self._access.tells_at, asks_at)
-
-    def know_links(self, edges: Edges) -> None:
-        """Take the links of the team, as they are now."""
-        self._access.know_links(edges)
+        return at if at < inf and self._soon(at) else inf
 
     def fill(
         self,

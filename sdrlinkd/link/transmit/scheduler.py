@@ -112,20 +112,29 @@ class BurstScheduler:
         self._fit = fit
         self._access, self._rate = fit.settled.access, fit.rate
         self._answers.set_slower(fit.slower)
-        by_request = self._access.by_request
-        self._turns = None if by_request is None else OwnTurns(
-            by_request, fit, self._outbox, self._composer, self._control_records, self._piggyback,
-            self._forecasts, self._answers, self._own_id,
-        )  # fmt: skip
-        by_auction = self._access.by_auction
-        self._bids = None if by_auction is None else Bids(
-            by_auction, self._outbox, self._composer, self._own_id
-        )  # fmt: skip
-        self._composer.leave_room(b"" if by_auction is None else ROOM)
+        self._adopt()
         self._pulse_s = fit.pulse_s
         self._overheard = Overheard(
             fit, self._forecasts, self._own_id, self._has_control, self._knows
         )
+
+    def _adopt(self) -> None:
+        """Ask for the air as the policy has it now: by request, or by telling what comes next."""
+        by_request, by_auction = self._access.by_request, self._access.by_auction
+        self._adopted = by_request, by_auction
+        self._turns = None if by_request is None else OwnTurns(
+            by_request, self._fit, self._outbox, self._composer, self._control_records,
+            self._piggyback, self._forecasts, self._answers, self._own_id,
+        )  # fmt: skip
+        self._bids = None if by_auction is None else Bids(
+            by_auction, self._outbox, self._composer, self._own_id
+        )  # fmt: skip
+        self._composer.leave_room(b"" if by_auction is None else ROOM)
+
+    def _follow_policy(self) -> None:
+        """Adopt what the access policy has become."""
+        if self._adopted != (self._access.by_request, self._access.by_auction):
+            self._adopt()
 
     def more_to_send(self) -> None:
         """Revise the decision to keep the channel free, as a message has come."""
@@ -134,6 +143,7 @@ class BurstScheduler:
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next, decided now; None: nothing to send, or not yet."""
+        self._follow_policy()
         if self._retry.waiting:
             return self._again(opportunity)
         earliest, airtime_s, _, sensed, _ = opportunity
@@ -152,7 +162,7 @@ class BurstScheduler:
                     self._has_repeated = True
                     return burst
         turns = self._turns
-        tells_at = inf if turns is None else turns.tells_at(earliest)
+        tells_at = min(access.tells_at, inf if turns is None else turns.asks_at(earliest))
         if head is None and earliest < min(records_due_at, tells_at):
             return None
         qos, mcs = Qos.DEFAULT if head is None else head, rate.lowest
@@ -175,6 +185,9 @@ class BurstScheduler:
         start = slot.start
         if slot.is_pulse:
             return self._pulse(start, qos)
+        # The team may go on by request from this burst on.
+        self._follow_policy()
+        turns = self._turns
         sealing = self._sealing
         if sealing.is_on and not self._may_seal(start, MAX_PDUS):
             return None
@@ -307,9 +320,10 @@ class BurstScheduler:
         if wakes_at <= now and self._held.is_settled:
             wakes_at = self._held.until
         wakes_at = min(self._control_records.due_at, wakes_at, self._answers.due_at(now))
+        lead_s, tells_at = self._fit.lead_s, self._access.tells_at
         if self._turns is not None:
-            lead_s = self._fit.lead_s
-            wakes_at = min(wakes_at, self._turns.tells_at(now + lead_s) - lead_s)
+            tells_at = min(tells_at, self._turns.asks_at(now + lead_s))
+        wakes_at = min(wakes_at, tells_at - lead_s)
         return max(wakes_at, self._numbers_at)
 
     def clear(self) -> None:
@@ -340,8 +354,7 @@ class BurstScheduler:
 
     def know_links(self, edges: Edges) -> None:
         """Take the links of the team, as they are now."""
-        if self._turns is not None:
-            self._turns.know_links(edges)
+        self._access.know_links(edges)
 
     def access_notices(self, now: float) -> list[str]:
         """What a person should know about the access policy, in sentences."""

@@ -1,0 +1,78 @@
+"""Whether all robots of the team that are here hear each other, as LSAs tell it."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from math import inf
+
+from sdrlinkd.link.access.team import DOUBTFUL, PRESENT_S
+from sdrlinkd.link.paths import Edges
+
+DEAF_S, POOR_S = 1.5, 5.0
+"""Time in s for which two robots must have been here, and have told nothing of each other, or that
+they hear each other poorly, before they count as apart. After a pause, what came meanwhile counts
+as lost for some time."""
+GONE_S = 1.5
+"""Time in s after which a robot of which nothing was heard begins anew."""
+
+Pair = tuple[int, int]
+
+
+class Hearing:
+    """Finds two of the robots `nodes` that do not hear each other."""
+
+    def __init__(self, own_id: int, nodes: Sequence[int]) -> None:
+        self._own_id = own_id
+        self._nodes = frozenset(nodes)
+        self._came_at: dict[int, float] = {}
+        self._seen_at: dict[int, float] = {}
+        """When we or somebody else heard each robot."""
+        self._edges: Edges = {}
+        self._poor_since: dict[Pair, float] = {}
+        """Since when LSAs tell of two robots that they do not hear each other well."""
+        self._deaf_since: dict[Pair, float] = {}
+        """Since when they tell that these do not hear each other at all."""
+        self.is_sure = True
+        """Whether all hear all well, by the last look."""
+
+    def heard(self, node: int, at: float) -> None:
+        """Note that we or somebody else has heard a robot."""
+        if node in self._nodes and node != self._own_id:
+            seen_at = self._seen_at.get(node, -inf)
+            if at > seen_at + GONE_S:
+                self._came_at[node] = at
+            self._seen_at[node] = max(at, seen_at)
+
+    def learn(self, edges: Edges) -> None:
+        """Take the links that LSAs tell."""
+        self._edges = edges
+
+    def apart(self, now: float) -> Pair | None:
+        """Two robots that are here and do not hear each other; None: all hear all."""
+        here = [node for node, at in self._seen_at.items() if at > now - PRESENT_S]
+        found, poor, deaf = None, dict[Pair, float](), dict[Pair, float]()
+        for pair in combinations(sorted([self._own_id, *here]), 2):
+            cost = self._cost(pair)
+            if cost <= DOUBTFUL:
+                continue
+            poor[pair] = self._poor_since.get(pair, now)
+            is_apart = self._were_here(pair, poor[pair], POOR_S)
+            if cost == inf:
+                deaf[pair] = self._deaf_since.get(pair, now)
+                is_apart |= self._were_here(pair, deaf[pair], DEAF_S)
+            if is_apart and found is None:
+                found = pair
+        self._poor_since, self._deaf_since = poor, deaf
+        self.is_sure = not poor
+        return found
+
+    def _cost(self, pair: Pair) -> float:
+        """What a link costs; infinity: there is none. A robot without links tells nothing yet."""
+        one, other = pair
+        links = self._edges.get(one)
+        return links.get(other, inf) if links and self._edges.get(other) else 0.0
+
+    def _were_here(self, pair: Pair, since: float, for_s: float) -> bool:
+        """Whether two robots were here for so long after `since`."""
+        others = [node for node in pair if node != self._own_id]
+        since = max(since, *(self._came_at[node] for node in others))
+        return min(self._seen_at[node] for node in others) > since + for_s
