@@ -26,7 +26,7 @@ def plan_of(run: Run, air: Air) -> Plan:
     ]
     # In lock-step composing takes no time.
     traits = PduLinkTraits(is_lockstep=True, gap_s=GAP / RATE_HZ, react_s=air.block_s)
-    settled = settle(AccessParams(policy="none"), 1, traits, air.max_burst_s, Random(0))
+    settled = settle(AccessParams(policy="none"), 1, traits, air.max_burst_s, Random(0), 0)
     setting = Setting(
         Airtimes(modem, PDU_SIZE), PDU_SIZE, MCS, air.max_burst_s, air.classes, 1, settled, traits,
         host_s=0.0,

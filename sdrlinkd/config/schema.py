@@ -36,7 +36,7 @@ from sdrlinkd.link import (
     TopicPolicy,
 )
 from sdrlinkd.sealing import SecurityParams
-from sdrlinkd.wire import SEAL_OVERHEAD
+from sdrlinkd.wire import SEAL_OVERHEAD, equal_payload
 
 WITHOUT_AIR = ("direct", "gnuradio")
 """Backends that carry PDUs instead of samples."""
@@ -119,6 +119,11 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     play: PlayParams = PlayParams()
     topic: dict[str, TopicPolicy] = {}
     """Topic policies by registry name, as in `[topic.odom]`."""
+
+    @property
+    def record_room(self) -> int:
+        """Octets for records in a PDU."""
+        return equal_payload(self.inner_pdu_size, 1)
 
     @property
     def inner_pdu_size(self) -> int:

@@ -217,7 +217,8 @@ class Link:
 
     def attach(self, traits: PduLinkTraits, access: AccessParams, rate: RateParams) -> Fit:
         """Fit the link to a radio that is up. Raises ConfigError and then changes nothing."""
-        fit = fit_to(traits, access, rate, self.own_id, self._rng)
+        room = self._composer.k_whole * self.registry.has_control
+        fit = fit_to(traits, access, rate, self.own_id, self._rng, room)
         policy, least = fit.settled.policy, fit.settled.access.least_room
         missing = least - self._composer.k_whole
         if least and not self.registry.has_control:

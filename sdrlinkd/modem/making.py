@@ -71,7 +71,9 @@ def _has_slots(config: Config, node_id: int, traits: PduLinkTraits) -> bool:
         RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable
     )
     try:
-        policy = settle(config.access, node_id, traits, longest_s, Random(0)).policy
+        policy = settle(
+            config.access, node_id, traits, longest_s, Random(0), config.record_room
+        ).policy
     except ConfigError:
         return False
     return policy in ("tdma", "grant")

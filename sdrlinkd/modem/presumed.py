@@ -58,7 +58,9 @@ def access_words(config: Config, own_id: int) -> list[str]:
     unsure = "" if radio.is_sure else "; unknown until the radio is open: the radio itself"
     how = f" ({radio.presumption}{unsure})" if radio.presumption else ""
     try:
-        settled = settle(config.access, own_id, radio.traits, radio.longest_s, Random(0))
+        settled = settle(
+            config.access, own_id, radio.traits, radio.longest_s, Random(0), config.record_room
+        )
     except ConfigError as error:
         if radio.is_sure:
             raise

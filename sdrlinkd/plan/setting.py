@@ -53,10 +53,10 @@ def setting_of(
     if n > MOST_ROBOTS:
         raise UserError(f"access.nodes: got {n} robots; allowed in a plan: at most {MOST_ROBOTS}")
     forced = msgspec.structs.replace(access, force=True)
-    settled = settle(forced, own_id, radio.traits, radio.longest_s, Random(0))
+    settled = settle(forced, own_id, radio.traits, radio.longest_s, Random(0), config.record_room)
     notes = guessed + _notes(config, radio, settled, n, host_s)
     try:
-        settle(access, own_id, radio.traits, radio.longest_s, Random(0))
+        settle(access, own_id, radio.traits, radio.longest_s, Random(0), config.record_room)
     except ConfigError as error:
         notes.append(f"the daemon refuses this: {error}")
     modem = config.modem

@@ -19,15 +19,17 @@ from tests.link.radios import LOCKSTEP, PACED, TX_WINDOWS, params
 from tests.link.world import make_link, next_burst
 
 LONGEST_S = 0.005
+ROOM = 200
 SOON = LOCKSTEP._replace(react_s=1e-4)
+QUICK = SOON._replace(pulse_s=4e-5, pdu_burst_s=(0.001,))
 USRP = PACED._replace(
     kind="soapy", turnaround_s=0.0, lead_s=0.0205, longest_burst_s=(LONGEST_S,),
     pdu_burst_s=(0.003,),
 )  # fmt: skip
 
 
-def settled(wanted, traits=LOCKSTEP, own_id=1, longest_s=LONGEST_S):
-    return settle(wanted, own_id, traits, longest_s, Random(1))
+def settled(wanted, traits=LOCKSTEP, own_id=1, longest_s=LONGEST_S, room=ROOM):
+    return settle(wanted, own_id, traits, longest_s, Random(1), room)
 
 
 def auto(nodes, **more):
@@ -62,9 +64,9 @@ def test_who_only_receives_takes_no_turns(policy):
     assert (found.policy, found.reason) == ("none", "because this radio only receives")
 
 
-def test_minislots_where_the_radio_reacts_within_a_millisecond_else_slots():
+def test_minislots_where_the_radio_reacts_within_a_millisecond_else_turns_by_request():
     soon, late = settled(auto([1, 2]), SOON), settled(auto([1, 2]), PACED)
-    assert (soon.policy, late.policy) == ("minislot", "tdma")
+    assert (soon.policy, late.policy) == ("minislot", "grant")
     assert "takes 0.184 ms" in soon.reason
     assert (
         "takes 6.08 ms to notice another robot's burst; minislot allows at most 1 ms" in late.reason
@@ -72,14 +74,33 @@ def test_minislots_where_the_radio_reacts_within_a_millisecond_else_slots():
     edge = SOON._replace(react_s=0.0)
     rest_s = 0.001 - edge.lead_s - edge.detect_s - 5e-6
     assert settled(auto([1, 2]), edge._replace(react_s=rest_s - 1e-6)).policy == "minislot"
-    assert settled(auto([1, 2]), edge._replace(react_s=rest_s + 1e-6)).policy == "tdma"
+    assert settled(auto([1, 2]), edge._replace(react_s=rest_s + 1e-6)).policy == "grant"
+
+
+def test_an_auction_from_three_robots_on_if_the_radio_sends_pulses_and_pdus_have_room():
+    three = auto([1, 2, 3])
+    assert settled(three, QUICK).policy == "auction"
+    assert settled(auto([1, 2]), QUICK).policy == "minislot"
+    assert settled(three, SOON).policy == "minislot"
+    assert settled(three, QUICK, room=44).policy == "minislot"
+    late = settled(three, QUICK._replace(react_s=0.002))
+    assert late.policy == "grant"
+    assert "auction allows at most 1 ms" in late.reason
+    assert all(settled(auto([*range(n)]), QUICK).policy == "auction" for n in range(3, 33))
+
+
+def test_slots_where_turns_by_request_are_not_for_the_radio():
+    assert settled(auto([1, 2]), USRP).policy == "grant"
+    assert settled(auto([1, 2]), USRP, room=44).policy == "tdma"
+    windows = USRP._replace(tx_window_s=1.0, rx_window_s=0.25)
+    assert settled(auto([1, 2]), windows).policy == "tdma"
 
 
 def test_slots_where_so_many_take_part_that_minislots_carry_less_than_half():
-    policies = [settled(auto(list(range(n))), SOON).policy for n in range(2, 60)]
+    policies = [settled(auto(list(range(n))), SOON, room=0).policy for n in range(2, 60)]
     assert policies == sorted(policies)
     assert set(policies) == {"minislot", "tdma"}
-    many = settled(auto(list(range(60))), SOON)
+    many = settled(auto(list(range(60))), SOON, room=0)
     assert "with 60 robots minislot leaves" in many.reason
 
 
@@ -141,10 +162,12 @@ def test_a_link_refuses_it_at_attach_and_reports_what_it_came_to():
         link.attach(USRP, params("minislot", [1, 2], force=False), RateParams())
     settled = link.attach(USRP, auto([1, 2]), RateParams()).settled
     report = link.report(0.0)
-    assert report.access.startswith("tdma: 2 slots")
-    assert (report.access_policy, round(report.access_share_pct)) == ("tdma", 97)
+    assert report.access.startswith("grant: 2 robots")
+    share = round(report.access_share_pct)
+    assert (report.access_policy, share > 60) == ("grant", True)
     assert report.access_reason.startswith("because this radio takes")
-    assert settled.sentence == (f"tdma, {report.access_reason}; 97 % of the airtime is usable")
+    said = f"grant, {report.access_reason}; {share} % of the airtime is usable"
+    assert settled.sentence == said
 
 
 def test_turns_by_request_need_room_for_a_plan():
@@ -172,7 +195,8 @@ def notices_of(access, now=3.0):
 
 
 def test_robots_that_came_to_different_policies_are_told():
-    slots, minislots = settled(auto([1, 2]), USRP).access, settled(auto([1, 2]), SOON).access
+    slots = settled(params("tdma", [1, 2]), USRP).access
+    minislots = settled(auto([1, 2]), SOON).access
     assert notices_of(slots) == notices_of(minislots) == ""
     minislots.take_frame(2, Frame(2, 0, 0x1234, 0), 1.0)
     assert "robot 2 keeps a schedule" in notices_of(minislots)
@@ -192,7 +216,7 @@ def test_robots_that_came_to_different_policies_are_told():
 def test_beacons_reach_the_policy():
     """Those of a robot that has no schedule; relayed ones say nothing."""
     teller, hearer = make_link(2, beacon_s=1.0), make_link(1)
-    access = hearer.attach(USRP, auto([1, 2]), RateParams()).settled.access
+    access = hearer.attach(USRP, params("tdma", [1, 2]), RateParams()).settled.access
     for number in range(3):
         assert notices_of(access) == ""
         now = 1.2 * number

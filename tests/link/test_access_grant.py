@@ -504,3 +504,20 @@ def test_whatever_is_told_turns_stay_within_bounds(events, own_id):
             access.sent(slot.start + PDU_S, None)
     assert access.state
     assert all(isinstance(each, str) for each in access.notices(now))
+
+
+def test_who_sends_in_no_turns_is_told_of():
+    """Robot 3 sends at random, robot 2 in its turns, of which plans were not heard now and then."""
+    team = Team([1, 2, 3], 4, loss=0.05, joins={3: 1e6})
+    access = team.robots[1].access
+    rng = Random(1)
+    for i in range(400):
+        team.run(FORMED_S + 0.01 * i)
+        team.robots[2].bulk_s = 0.01
+        if i > 100:
+            access.heard(3, team.robots[1].clock(team.t) - rng.uniform(0, 0.01), False)
+        if i == 100:
+            assert access.notices(team.t) == []
+    (notice,) = access.notices(team.t)
+    assert notice.startswith("robot 3 sends outside of the turns that it is given")
+    assert access.notices(team.t + 100.0) == []

@@ -49,6 +49,7 @@ class Doorkeeper:
     keeps_schedule = False
     by_request = by_auction = None
     tells_at = math.inf
+    needs_links = False
 
     def know_links(self, edges):
         pass

@@ -1,6 +1,7 @@
 """Chooses the access policy that fits the radio, by the share of airtime that each can use."""
 
 from collections.abc import Mapping
+from math import inf
 from random import Random
 from typing import Literal, NamedTuple
 
@@ -8,12 +9,15 @@ import msgspec
 
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link.access.base import Access
-from sdrlinkd.link.access.choice import check_access, make_access, make_free, reaction_s
+from sdrlinkd.link.access.by_hearing import ByHearing
+from sdrlinkd.link.access.choice import MANY, check_access, make_access, make_free, reaction_s
+from sdrlinkd.link.access.grant import Grants
 from sdrlinkd.link.access.params import AccessParams
 from sdrlinkd.link.traits import PduLinkTraits
 
 SOON_S = 0.001
-"""Longest reaction time in s for mini-slots: from another's start until our radio holds back."""
+"""Longest reaction time in s for minislot and auction: from another's start until our radio holds
+back."""
 FAIR = 0.5
 """A policy is refused if it carries less than this share of what the best policy carries."""
 
@@ -46,12 +50,14 @@ class Settled(NamedTuple):
 
 
 def settle(
-    params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float, rng: Random
-) -> Settled:
+    params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float, rng: Random,
+    room: int,
+) -> Settled:  # fmt: skip
     """The access policy for this radio and bursts of at most `longest_burst_s`, with the reason.
 
-    Robots with the same parameters and radios get the same result. Raises ConfigError if the radio
-    does not support the policy, or if another policy carries twice as much.
+    `room` is the number of octets for records in a PDU; 0: it can hold none. Robots with the same
+    parameters and radios get the same result. Raises ConfigError if the radio does not support the
+    policy, or if another policy carries twice as much.
     """
     check_access(params, own_id)
     policy, reason = params.policy, "as configured"
@@ -62,7 +68,7 @@ def settle(
     if policy != "none" and (policy == "csma" or _others(params, own_id)):
         shares = air_shares(params, own_id, traits, longest_burst_s)
     if policy == "auto":
-        policy, reason = _chosen(params, own_id, traits, shares)
+        policy, reason = _chosen(params, own_id, traits, shares, room)
     if policy == "none":
         is_alone = params.policy == "auto" and traits.senses and traits.shares_air
         access: Access = make_free(traits, is_alone)
@@ -89,7 +95,7 @@ def air_shares(
 ) -> dict[str, float]:
     """The share of airtime that each policy can use with the radio's times; 0: unsupported."""
     shares: dict[str, float] = {}
-    policies: tuple[Policy, ...] = ("csma", "minislot", "tdma")
+    policies: tuple[Policy, ...] = ("csma", "minislot", "auction", "tdma", "grant")
     # csma does not need `nodes`; without them, assume one other robot.
     nodes = params.nodes or [own_id, (own_id + 1) % 255]
     for policy in policies:
@@ -113,7 +119,7 @@ def _others(params: AccessParams, own_id: int) -> set[int]:
 
 
 def _chosen(
-    params: AccessParams, own_id: int, traits: PduLinkTraits, shares: Mapping[str, float]
+    params: AccessParams, own_id: int, traits: PduLinkTraits, shares: Mapping[str, float], room: int
 ) -> tuple[Policy, str]:
     """The (policy, reason) that `auto` chooses for this radio."""
     if not (traits.shares_air and traits.senses):
@@ -122,14 +128,22 @@ def _chosen(
         return "none", "because access.nodes lists no other robot"
     apart_s, n = reaction_s(traits), len(set(params.nodes))
     reacts = f"because this radio takes {1e3 * apart_s:.3g} ms to notice another robot's burst"
+    # Two robots have so few mini-slots that these cost less than a contest.
+    has_auction = shares["auction"] and n >= MANY and room >= ByHearing.least_room
+    quick: Policy = "auction" if has_auction else "minislot"
+    # In TX windows, a turn may be longer than the radio can send at a time.
+    least = FAIR * max(shares.values())
+    has_room = room >= Grants.least_room and traits.tx_window_s == inf
+    has_grant = has_room and shares["grant"] >= least
+    steady: Policy = "grant" if has_grant else "tdma"
     if apart_s > SOON_S:
-        return "tdma", f"{reacts}; minislot allows at most {1e3 * SOON_S:g} ms"
-    if shares["minislot"] < FAIR * shares["tdma"]:
-        return "tdma", (
-            f"because with {n} robots minislot leaves {percent(shares['minislot'])} of the airtime "
-            f"usable and tdma {percent(shares['tdma'])}"
+        return steady, f"{reacts}; {quick} allows at most {1e3 * SOON_S:g} ms"
+    if shares[quick] < least:
+        return steady, (
+            f"because with {n} robots {quick} leaves {percent(shares[quick])} of the airtime "
+            f"usable and {steady} {percent(shares[steady])}"
         )
-    return "minislot", reacts
+    return quick, reacts
 
 
 def _refuse_poor(settled: Settled, n: int) -> None:

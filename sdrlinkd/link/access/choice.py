@@ -170,7 +170,7 @@ def _make_grant(
     params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float, rng: Random
 ) -> Grants:
     n = len(params.nodes)
-    turn_s = max(traits.pdu_burst_s) + traits.gap_s
+    turn_s = max(traits.pdu_burst_s, default=longest_burst_s) + traits.gap_s
     react_s = traits.react_s + traits.lead_s + traits.ahead_s + traits.detect_s + MARGIN_S
     guard_s = traits.turnaround_s + traits.gap_s + MARGIN_S + 2 * traits.index_error_s
     least_s = react_s + min(n, MOST_TURNS + 1) * (turn_s + guard_s)

@@ -20,6 +20,7 @@ from sdrlinkd.link.access.own_request import OwnRequest
 from sdrlinkd.link.access.planner import PATIENCE_S, Planner
 from sdrlinkd.link.access.requests import Waiting
 from sdrlinkd.link.access.round_plan import PLAN_SIZE, Times
+from sdrlinkd.link.access.strays import Strays
 from sdrlinkd.link.access.tdma_states import Happens
 from sdrlinkd.link.access.team import Team
 from sdrlinkd.link.access.turns import ALMOST_S
@@ -58,6 +59,7 @@ class Grants(BusyChannel):
         micro = [round(1e6 * each) for each in (*times.ticks, times.turn_s, times.budget_s)]
         self._schedule = crc16(pack(">BIIII", RecordType.GRANT, *micro) + bytes(sorted(nodes)))
         self._frames = HeardFrames(nodes, self._schedule)
+        self._strays = Strays()
         self._team = Team(own_id, nodes)
         begin_s = times.turn_s + times.ticks.guard_s + times.react_s
         self.leads = Leadership(own_id, self._team, self.round_s, begin_s)
@@ -218,8 +220,12 @@ class Grants(BusyChannel):
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """Note that we hear robot `src` directly."""
         self._asked_at = max(self._asked_at, at)
-        if not is_relayed:
-            self._team.heard(src, at)
+        if is_relayed:
+            return
+        self._team.heard(src, at)
+        has_turn = self._rounds.has_turn(src, at, self._times.ticks.guard_s)
+        if has_turn is not None and src != self.leads.root:
+            self._strays.heard(src, at, has_turn=has_turn)
 
     def told_of(self, node: int, at: float, by: int) -> None:
         """Note that robot `by` hears robot `node`."""
@@ -263,8 +269,8 @@ class Grants(BusyChannel):
                 self.ahead_s = min(max(0.0, found.begin - last.begin), self.round_s)
 
     def notices(self, now: float) -> list[str]:
-        """Sentences on robots that keep another schedule."""
-        return self._frames.notices(self.state, now)
+        """Sentences on robots that keep another schedule, or none."""
+        return self._frames.notices(self.state, now) + self._strays.notices(now)
 
     def begin(self, wish: Wish, start: float) -> Slot:
         """Plan from our burst at `start` on, where nobody did so before."""

@@ -63,6 +63,14 @@ class KnownRounds:
         for each in self._rounds:
             yield from each.of(self._own_id)
 
+    def has_turn(self, node: int, at: float, slack_s: float) -> bool | None:
+        """Whether a robot has a turn at `at`; None: no round is known for that time."""
+        for each in self._rounds:
+            if each.begin - slack_s <= at <= each.end:
+                turns = each.of(node)
+                return any(turn.begin - slack_s <= at <= turn.end for turn in turns)
+        return None
+
     def nodes(self) -> set[int]:
         """The robots with turns."""
         return {turn.node for each in self._rounds for turn in each.turns}

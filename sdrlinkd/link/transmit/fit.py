@@ -52,15 +52,19 @@ class Fit(NamedTuple):
 
 
 def fit_to(
-    traits: PduLinkTraits, access: AccessParams, rate: RateParams, own_id: int, rng: Random
-) -> Fit:
-    """Choose access policy and rate control for a radio with these traits. Raises ConfigError."""
+    traits: PduLinkTraits, access: AccessParams, rate: RateParams, own_id: int, rng: Random,
+    room: int,
+) -> Fit:  # fmt: skip
+    """Choose access policy and rate control for a radio with these traits. Raises ConfigError.
+
+    `room` is the number of octets for records in a PDU.
+    """
     control = RateControl(rate, traits.needed_snr_db, traits.mcs)
     longest_s = traits.longest_in_use_s(control.usable)
     lengths_s = tuple(
         length_s for mcs, length_s in enumerate(traits.pdu_burst_s) if mcs in control.usable
     )
-    settled = settle(access, own_id, traits._replace(pdu_burst_s=lengths_s), longest_s, rng)
+    settled = settle(access, own_id, traits._replace(pdu_burst_s=lengths_s), longest_s, rng, room)
     return Fit(
         settled,
         control,
