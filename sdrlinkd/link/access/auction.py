@@ -65,7 +65,7 @@ class Auction(BusyChannel):
         self._n_bits = n_bits(len(nodes))
         self.pause_s = QUIET * minislot_s
         self.round_s = (QUIET + self._n_bits) * minislot_s
-        self._wants = KnownWants(nodes)
+        self._wants = KnownWants(own_id, nodes)
         self._told_at = NEVER
         """When the last burst of another robot began that told what it wants."""
         self._looked_at = -inf
@@ -191,13 +191,13 @@ class Auction(BusyChannel):
             self._mute.add(src, at)
 
     def notices(self, now: float) -> list[str]:
-        """Sentences on robots that use another access policy."""
+        """Sentences on robots that use another access policy, or always want urgent."""
         mute = [
             f"robot {src} takes no part in the auction and this robot does: their bursts collide; "
             "give both the same [access]"
             for src in self._mute.lately(now, MUTE)
         ]
-        return super().notices(now) + mute
+        return super().notices(now) + mute + self._wants.urgent.notices(now)
 
     def _look(self, sensed: Sensed) -> None:
         """Note what has ended since the last time: a burst that told something, or not."""
@@ -238,9 +238,8 @@ class Auction(BusyChannel):
         if not self._challenges(wish, place):
             return None
         qos = min(wish.qos, Qos.LATENCY) if self._has_waited(STARVED) else wish.qos
-        has_waited = self._has_waited(PATIENCE)
-        contest = Contest(qos, self._rank, len(self._nodes), has_waited=has_waited)
-        self._contest = place.begin, contest
+        waited = self._has_waited(PATIENCE)
+        self._contest = place.begin, Contest(qos, self._rank, len(self._nodes), has_waited=waited)
         return self._pulse(place.start)
 
     def _challenges(self, wish: Wish, place: Place) -> bool:
@@ -253,8 +252,9 @@ class Auction(BusyChannel):
             return wants.is_unsure(self._own_id, now)
         if first.qos > Qos.URGENT and self._has_waited(STARVED):
             return True
-        is_unknown = wants.of(self._own_id, since) is None
-        return wish.qos <= first.qos and is_unknown and self._has_waited(PATIENCE)
+        is_unknown = wants.lacks(self._own_id, wish.qos, priority, since)
+        is_long = self._has_waited(PATIENCE) or wants.goes_again(first, priority, self._asked[0])
+        return wish.qos <= first.qos and is_unknown and is_long
 
     def _in_contest(self, wish: Wish, place: Place, pulses: Sequence[float]) -> Slot | None:
         """What we do in a round with a challenge."""

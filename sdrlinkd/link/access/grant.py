@@ -17,7 +17,7 @@ from sdrlinkd.link.access.leadership import Leadership
 from sdrlinkd.link.access.own_request import OwnRequest
 from sdrlinkd.link.access.planner import PATIENCE_S, Planner
 from sdrlinkd.link.access.requests import Waiting
-from sdrlinkd.link.access.round_plan import MOST_TOLD, Times
+from sdrlinkd.link.access.round_plan import PLAN_SIZE, Times
 from sdrlinkd.link.access.sightings import Sightings, schedule_notices
 from sdrlinkd.link.access.tdma_states import Happens
 from sdrlinkd.link.access.team import Team
@@ -26,9 +26,6 @@ from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import (
     ANYBODY,
-    FRAME_SIZE,
-    GRANT_OVERHEAD,
-    TURN_SIZE,
     WANT_SIZE,
     Frame,
     Record,
@@ -37,10 +34,6 @@ from sdrlinkd.wire import (
 )
 from sdrlinkd.wire import Grant as GrantRecord
 from sdrlinkd.wire import Want as WantRecord
-
-PLAN_SIZE = FRAME_SIZE + GRANT_OVERHEAD + MOST_TOLD * TURN_SIZE
-LEAST_ROOM = PLAN_SIZE + WANT_SIZE
-"""Octets for records that a PDU must have: for a plan and a request."""
 
 
 class Grants(BusyChannel):
@@ -74,7 +67,7 @@ class Grants(BusyChannel):
         self._leads = Leadership(own_id, self._team, self.round_s, begin_s)
         self._planner = Planner(own_id, self._team, times)
         self._request = OwnRequest(own_id, times, self.round_s)
-        self._rounds = KnownRounds(own_id, times.turn_s, times.root_s)
+        self._rounds = KnownRounds(own_id, times, len(nodes))
         self._behind: dict[int, WantRecord] = {}
         """Requests to pass on to the root."""
         self._tried = -inf, False
@@ -184,13 +177,16 @@ class Grants(BusyChannel):
 
     def request(self, start: float, left: Waiting | None) -> WantRecord | None:
         """What to ask the root for, unless it knows."""
-        if self._leads.is_root or left is None:
-            return None
-        return self._request.of(left, start)
+        if self._leads.is_root:
+            self._rounds.urgent.waits(left, start)
+        elif left is not None:
+            return self._request.of(left, start)
+        return None
 
     def requested(self, want: WantRecord, start: float) -> None:
         """Note what the root knows from now on."""
         self._request.told(want, start)
+        self._rounds.urgent.asks(want, start)
 
     def told(self, start: float, length_s: float, room: int) -> list[Record]:
         """The plan of the next round, or the one that we pass on, with requests to pass on."""
@@ -253,6 +249,7 @@ class Grants(BusyChannel):
         """Take what a robot wants, or pass it on to the root."""
         if want.node not in self._team.nodes or want.node == self._own_id:
             return
+        self._rounds.urgent.asks(want, at)
         if self._leads.is_root:
             self._planner.take(want, at)
         elif self._team.places(self._leads.root).is_behind(want.node, self._own_id):
@@ -278,8 +275,9 @@ class Grants(BusyChannel):
                 self.ahead_s = min(max(0.0, found.begin - last.begin), self.round_s)
 
     def notices(self, now: float) -> list[str]:
-        """Sentences on robots that keep another schedule."""
-        return schedule_notices(self._outsiders, self._strangers, self.state, now)
+        """Sentences on robots that keep another schedule, or always want urgent."""
+        others = schedule_notices(self._outsiders, self._strangers, self.state, now)
+        return others + self._rounds.urgent.notices(now)
 
     def _begin_anew(self) -> None:
         """Forget the rounds of another root."""
