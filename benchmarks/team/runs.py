@@ -41,7 +41,6 @@ class Run(Generic[T]):
 class _UnderWay(NamedTuple):
     run: Run  # type: ignore[type-arg]  # any
     process: multiprocessing.Process
-    began_at: float
 
 
 class Runs:
@@ -87,22 +86,21 @@ class Runs:
         process = multiprocessing.Process(target=_work, args=(run.what, theirs), daemon=True)
         process.start()
         theirs.close()
-        self._under_way[ours] = _UnderWay(run, process, time.monotonic())
+        self._under_way[ours] = _UnderWay(run, process)
 
     def _finish(self, ours: Connection) -> None:
-        run, process, began_at = self._under_way.pop(ours)
+        run, process = self._under_way.pop(ours)
         try:
-            run.found, run.error = ours.recv()
+            run.found, run.error, used_s = ours.recv()
         except EOFError:
             process.join()
-            run.error = PeerError(f"its process ended with {process.exitcode}")
+            run.error, used_s = PeerError(f"its process ended with {process.exitcode}"), 0.0
         ours.close()
         process.join()
         run.is_over = True
         self._n_over += 1
         n = self._n_over + len(self._under_way) + len(self._waiting)
-        took_s = time.monotonic() - began_at
-        sys.stderr.write(f"{self._n_over} of {n}: {run.name}, {took_s:.1f} s\n")
+        sys.stderr.write(f"{self._n_over} of {n}: {run.name}, {used_s:.1f} s of processor time\n")
 
 
 def results(runs: Mapping[Key, Run[T]]) -> dict[Key, T]:
@@ -124,9 +122,10 @@ def _work(what: Callable[[], T], theirs: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         told: tuple[T | None, Exception | None] = what(), None
-    except Exception as error:  # it is raised where the result is used
+    except Exception as error:  # It is raised where the result is used.
         told = None, error
+    used_s = time.process_time()
     try:
-        theirs.send(told)
+        theirs.send((*told, used_s))
     except (TypeError, AttributeError, ValueError) as error:
-        theirs.send((None, PeerError(repr(error))))
+        theirs.send((None, PeerError(repr(error)), used_s))
