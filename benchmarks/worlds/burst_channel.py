@@ -214,21 +214,30 @@ class BurstChannel:
         late = self._pulses[bisect_right(self._pulses, since - KEPT_BEFORE_S, key=_start) :]
         if not late:
             return []
-        turn_s, tail_s = self._nodes[node].radio.turnaround_s, TAIL / self._air.rate_hz
-        deaf = [
-            (each.start_s - turn_s, each.start_s + each.length_s + turn_s)
-            for each in late
-            if each.sender == node and not self._nodes[node].radio.full_duplex
-        ]
+        one, tail_s = self._nodes[node], TAIL / self._air.rate_hz
+        own, turn_s = list[tuple[float, float]](), one.radio.turnaround_s
+        if not one.radio.full_duplex:
+            own = [
+                (each.start_s - turn_s, each.start_s + each.length_s + turn_s)
+                for each in late
+                if each.sender == node
+            ]
+        deaf_until = one.deaf[-1][1] if one.deaf else NEVER
         found = []
+        # This is the innermost loop of large teams.
         for each in late:
             begin = each.arrives.get(node)
-            if begin is None or begin <= since or begin + each.length_s + tail_s > t:
+            if begin is None or begin <= since:
                 continue
             end = begin + each.length_s
-            is_lost = any(first < end and begin < last for first, last in deaf)
-            if not is_lost and not self._is_deaf(node, begin, end):
-                found.append((begin, end))
+            if end + tail_s > t:
+                continue
+            for first, last in own:
+                if first < end and begin < last:
+                    break
+            else:
+                if begin >= deaf_until or not self._is_deaf(node, begin, end):
+                    found.append((begin, end))
         return sorted(found)
 
     def _hops_of(self, sender: int, t: float) -> dict[int, Hop]:
