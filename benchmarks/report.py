@@ -86,7 +86,7 @@ def main(
     ours = {key: getattr(options, key) for key in vars(own.parse_args([]))} if own else {}
     rows: list[Row] = []
     drawings: dict[str, Any] = {}
-    stolen = Stolen()
+    stolen, is_aborted = Stolen(), False
     try:
         with attempt("the rest") as all_of_it:
             for found in measure(options.seed, options.quick, **ours):
@@ -95,16 +95,19 @@ def main(
                     drawings[found.name] = found.shows
                 else:
                     rows.append(found)
+    except KeyboardInterrupt:
+        is_aborted = True
+        sys.stderr.write("aborted: what follows is not complete\n")
     finally:
         report = _report(benchmark, rows, options, stolen.pct())
         if options.json:
             sys.stdout.write(json.dumps(report, indent=2) + "\n")
         else:
             screen_console().print(table_of(benchmark, rows))
-        if options.keep and rows:
+        if options.keep and rows and not is_aborted:
             path = keep(benchmark, {**report, "drawings": drawings})
             sys.stderr.write(f"kept in {path}\n")
-    if all_of_it.failed or not rows:
+    if is_aborted or all_of_it.failed or not rows:
         return 2
     return 0 if all(row.ok for row in rows) else 1
 

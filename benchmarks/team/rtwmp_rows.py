@@ -1,11 +1,12 @@
 """Rows of RT-WMP: beside the Pound paper's figures of it, and in a team on our air."""
 
 from collections.abc import Iterator
+from functools import partial
 from statistics import mean
 
 import numpy as np
 
-from benchmarks.flows import Figures, figures
+from benchmarks.flows import Figures, Trace, figures
 from benchmarks.peers.pound.rtwmp import PAPER
 from benchmarks.report import Row
 from benchmarks.team.rtwmp import (
@@ -13,10 +14,12 @@ from benchmarks.team.rtwmp import (
     FITTED,
     LINKS,
     PATIENT,
+    Shared,
     reconnection_s,
     share,
     tables,
 )
+from benchmarks.team.runs import Runs, all_of
 
 PAPERS = {
     2: (Figures(20.1, 2.8, 4.7, 5.0, 99.6, 0.399),
@@ -35,39 +38,68 @@ COLUMNS = {
 UNITS = {"ms": "ms", "pct": "%", "mbps": "Mbit/s"}
 
 
-def rows(seed: int, quick: bool) -> Iterator[Row]:
+PARAMS = (FITTED, AS_PROGRAMMED, PATIENT)
+
+
+def rows(runs: Runs, seed: int, quick: bool) -> Iterator[Row]:
     """All rows; none has a target, since nothing of ours is measured."""
-    for n_nodes in LINKS:
-        yield from _tables(n_nodes, seed, quick)
-    for n_nodes in LINKS:
-        trials = 2 if quick else 20
-        found, programmed, patient = (
-            reconnection_s(n_nodes, seed, trials, params)
-            for params in (FITTED, AS_PROGRAMMED, PATIENT)
-        )
-        value, paper = mean(found), PAPERS_V_S[n_nodes]
-        yield Row(
-            f"rtwmp_table5_{n_nodes}n_s", value, "s", None, "less", len(found),
-            {
-                "over_paper": value / paper,
-                "as_programmed": mean(programmed),
-                "wait_100ms": mean(patient),
-            },
-            paper,
-            f"from the return of the radio until each flow comes; at worst {max(found):.3f} s; "
-            "the paper's cards rejoin their network in this time",
-        )  # fmt: skip
-    for n_nodes in (8, 24):
-        yield from _shared(n_nodes, seed, quick)
+    traces = {
+        n: [
+            runs.add(
+                f"RT-WMP's tables, {n} nodes", 20.0,
+                partial(tables, n, seed, quick, params, loss),
+            )
+            for params, loss in (
+                (FITTED, 0), (PAPER, 0), (AS_PROGRAMMED, 0), (PATIENT, RARE_LOSS), (FITTED, LOSS),
+            )
+        ]
+        for n in LINKS
+    }  # fmt: skip
+    trials = 2 if quick else 20
+    outages = {
+        n: [
+            runs.add(
+                f"RT-WMP's outages, {n} nodes", 10.0,
+                partial(reconnection_s, n, seed, trials, params),
+            )
+            for params in PARAMS
+        ]
+        for n in LINKS
+    }  # fmt: skip
+    duration_s = 4.0 if quick else 120.0
+    shared = {
+        n: runs.add(f"RT-WMP, {n} robots", n * duration_s, partial(share, n, seed, duration_s))
+        for n in (8, 24)
+    }
+
+    def found() -> Iterator[Row]:
+        for n, of in traces.items():
+            yield from _tables(n, all_of(of))
+        for n, each in outages.items():
+            yield _outages(n, all_of(each))
+        for n, run in shared.items():
+            yield from _shared(n, run.result())
+
+    return found()
 
 
-def _tables(n_nodes: int, seed: int, quick: bool) -> Iterator[Row]:
-    runs = [
-        tables(n_nodes, seed, quick, params, loss)
-        for params, loss in (
-            (FITTED, 0), (PAPER, 0), (AS_PROGRAMMED, 0), (PATIENT, RARE_LOSS), (FITTED, LOSS),
-        )
-    ]  # fmt: skip
+def _outages(n_nodes: int, all_back_s: list[list[float]]) -> Row:
+    found, programmed, patient = all_back_s
+    value, paper = mean(found), PAPERS_V_S[n_nodes]
+    return Row(
+        f"rtwmp_table5_{n_nodes}n_s", value, "s", None, "less", len(found),
+        {
+            "over_paper": value / paper,
+            "as_programmed": mean(programmed),
+            "wait_100ms": mean(patient),
+        },
+        paper,
+        f"from the return of the radio until each flow comes; at worst {max(found):.3f} s; "
+        "the paper's cards rejoin their network in this time",
+    )  # fmt: skip
+
+
+def _tables(n_nodes: int, runs: list[list[Trace]]) -> Iterator[Row]:
     fitted, bare, programmed, patient, lossy = ([figures(trace) for trace in run] for run in runs)
     for i, (flow, columns) in enumerate(COLUMNS.items()):
         table = 2 * n_nodes - 3 + i
@@ -91,9 +123,7 @@ def _tables(n_nodes: int, seed: int, quick: bool) -> Iterator[Row]:
             )  # fmt: skip
 
 
-def _shared(n_nodes: int, seed: int, quick: bool) -> Iterator[Row]:
-    duration_s = 4.0 if quick else 120.0
-    found = share(n_nodes, seed, duration_s)
+def _shared(n_nodes: int, found: Shared) -> Iterator[Row]:
     delays_ms = 1e3 * np.array(found.delays_s)
     loops = found.frames["message"]
     note = (

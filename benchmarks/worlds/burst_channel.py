@@ -1,8 +1,10 @@
 """The medium in bursts, not samples: decides who receives what, from tables of error rates."""
 
 import math
+from bisect import bisect_right, insort
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -64,6 +66,9 @@ class _Pulse(NamedTuple):
     arrives: dict[int, float]
 
 
+_start = attrgetter("start_s")
+
+
 @dataclass(slots=True)
 class _Node:
     radio: RadioParams
@@ -106,6 +111,7 @@ class BurstChannel:
         self._hops: dict[int, tuple[float, dict[int, Hop]]] = {}
         self._live: list[Flight] = []
         self._pulses: list[_Pulse] = []
+        """In order of their starts."""
 
     def join(self, node: int, radio: RadioParams) -> Capabilities:
         """Add a node; returns the capabilities of its radio."""
@@ -149,8 +155,8 @@ class BurstChannel:
             for other, hop in hops.items()
             if hop.snr_db > self._loud_db
         }
-        kept = [each for each in self._pulses if each.start_s > start_s - PULSES_S]
-        self._pulses = [*kept, _Pulse(node, start_s, length_s, arrives)]
+        del self._pulses[: bisect_right(self._pulses, start_s - PULSES_S, key=_start)]
+        insort(self._pulses, _Pulse(node, start_s, length_s, arrives), key=_start)
 
     def readers(self, flight: Flight, number: int, nodes: Sequence[int]) -> list[tuple[int, float]]:
         """Those of `nodes` that decode a PDU, with the SNR in dB that their receivers report.
@@ -205,25 +211,33 @@ class BurstChannel:
 
     def _heard_pulses(self, node: int, since: float, t: float) -> list[tuple[float, float]]:
         """(begin, end) of the pulses that a node has heard completely between two times."""
-        after = since - KEPT_BEFORE_S
-        late = [each for each in self._pulses if each.start_s > after]
+        late = self._pulses[bisect_right(self._pulses, since - KEPT_BEFORE_S, key=_start) :]
         if not late:
             return []
-        turn_s, tail_s = self._nodes[node].radio.turnaround_s, TAIL / self._air.rate_hz
-        deaf = [
-            (each.start_s - turn_s, each.start_s + each.length_s + turn_s)
-            for each in late
-            if each.sender == node and not self._nodes[node].radio.full_duplex
-        ]
+        one, tail_s = self._nodes[node], TAIL / self._air.rate_hz
+        own, turn_s = list[tuple[float, float]](), one.radio.turnaround_s
+        if not one.radio.full_duplex:
+            own = [
+                (each.start_s - turn_s, each.start_s + each.length_s + turn_s)
+                for each in late
+                if each.sender == node
+            ]
+        deaf_until = one.deaf[-1][1] if one.deaf else NEVER
         found = []
+        # This is the innermost loop of large teams.
         for each in late:
             begin = each.arrives.get(node)
-            if begin is None or begin <= since or begin + each.length_s + tail_s > t:
+            if begin is None or begin <= since:
                 continue
             end = begin + each.length_s
-            is_lost = any(first < end and begin < last for first, last in deaf)
-            if not is_lost and not self._is_deaf(node, begin, end):
-                found.append((begin, end))
+            if end + tail_s > t:
+                continue
+            for first, last in own:
+                if first < end and begin < last:
+                    break
+            else:
+                if begin >= deaf_until or not self._is_deaf(node, begin, end):
+                    found.append((begin, end))
         return sorted(found)
 
     def _hops_of(self, sender: int, t: float) -> dict[int, Hop]:

@@ -26,7 +26,9 @@ BENCHMARKS: dict[str, Benchmark] = {
     "repeats": Benchmark(
         "Messages over an air that loses PDUs: with repeats, and as others do it.", 3,
     ),
-    "team": Benchmark("Teams over several hops: how soon routes heal, and what that costs.", 1),
+    "team": Benchmark(
+        "Teams on one channel: hops, crowds, worst cases, and how soon routes heal.", 40
+    ),
     "modem_path": Benchmark("The modem in a daemon: latency, and speed relative to real time.", 2),
     "realtime": Benchmark("Whole daemons in real time: latency, ages, load and start.", 8),
     "waterfall": Benchmark("Where a message's time goes in a daemon, stage by stage.", 1),

@@ -45,12 +45,12 @@ class PulsingAir(Air):
         self._wants[node.id, node.own[-1][0]] = want
 
     def _tell(self, node):
-        done = [each for each in node.heard if each.end <= node.until]
-        read = [each for each in done if self._reads(node, each, each.end)]
-        super()._tell(node)
-        for burst in read:
-            want = self._wants[burst.src, burst.begin]
-            node.access.take_want(burst.src, want, node.clock(burst.begin))
+        while node.heard and node.heard[0].end <= node.until:
+            burst = node.heard.pop(0)
+            if self._reads(node, burst, burst.end):
+                at = node.clock(burst.begin)
+                node.access.heard(burst.src, at, False)
+                node.access.take_want(burst.src, self._wants[burst.src, burst.begin], at)
 
     def sensed(self, node):
         carrier = super().sensed(node)

@@ -301,7 +301,6 @@ def test_a_plan(present, waiting, served_at, links, is_open):
         10.0,
         present,
         shares(TIMES, waiting, {}),
-        waiting,
         places,
         served_at,
         is_open=is_open,

@@ -31,7 +31,14 @@ from sdrlinkd.link.access.minislot import LEVELS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
 from sdrlinkd.link.access.requests import Due, Waiting, together, waiting_of, want_of
 from sdrlinkd.link.access.reuse import Apart, stages, told
-from sdrlinkd.link.access.round_plan import LEAST_TURNS, Times, before, plan, shares
+from sdrlinkd.link.access.round_plan import (
+    LEAST_TURNS,
+    Times,
+    account,
+    before,
+    plan,
+    shares,
+)
 from sdrlinkd.link.access.round_plan import STANDS as TURN_STANDS
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S, Tdma
@@ -75,6 +82,7 @@ __all__ = [
     "Times",
     "Waiting",
     "Wish",
+    "account",
     "after",
     "before",
     "check_access",

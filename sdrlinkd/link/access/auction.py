@@ -16,6 +16,7 @@ from math import inf
 from sdrlinkd.link.access.base import NEVER, BusyChannel, Slot, Wish
 from sdrlinkd.link.access.by_auction import ByAuction
 from sdrlinkd.link.access.contest import Contest, n_bits
+from sdrlinkd.link.access.disturbance import Disturbance
 from sdrlinkd.link.access.known_wants import KnownWants
 from sdrlinkd.link.access.mini_rounds import QUIET, MiniRounds, Place, is_near
 from sdrlinkd.link.access.own_slots import OwnSlots
@@ -31,11 +32,6 @@ against those that have not waited for so long."""
 STARVED = 200
 """Bursts of others after which a robot challenges whatever it has, unless something urgent is next,
 and takes part in the contest with class latency at least."""
-FRUITLESS = 2
-"""Rounds with pulses and without a burst from which the pulses count as interference."""
-DISTURBED_S = 1.0
-"""Time in s for which pulses are not used after interference, if it comes again within this time.
-First it is until the next burst, from which a robot that just came into range counts as well."""
 MUTE = 20
 """Bursts in sequence without a WANT from which a robot takes no part. Repeats have none."""
 PAUSE_S = 0.05
@@ -65,7 +61,7 @@ class Auction(BusyChannel):
         self._n_bits = n_bits(len(nodes))
         self.pause_s = QUIET * minislot_s
         self.round_s = (QUIET + self._n_bits) * minislot_s
-        self._wants = KnownWants(nodes)
+        self._wants = KnownWants(own_id, nodes)
         self._told_at = NEVER
         """When the last burst of another robot began that told what it wants."""
         self._looked_at = -inf
@@ -77,10 +73,8 @@ class Auction(BusyChannel):
         """When our last pulses began."""
         self._contest: tuple[float, Contest] | None = None
         """Our part in a contest, and the begin of its round."""
-        self._fruitless = 0
-        self._disturbed_at, self._disturbed_until = -inf, -inf
+        self._disturbance = Disturbance()
         self._is_disturbed = False
-        self._is_first = False  # Whether that is only until the next burst.
         self._mute = Sightings()
         """Robots whose bursts do not tell what they want."""
         self._seen_bursts = 0
@@ -127,7 +121,7 @@ class Auction(BusyChannel):
         if earliest > self._asked[1] + PAUSE_S:
             self._asked = self._wants.n_bursts, earliest
         self._asked = self._asked[0], earliest
-        self._is_disturbed = earliest < self._disturbed_until
+        self._is_disturbed = self._disturbance.lasts(earliest)
         if self._is_disturbed:
             return self._in_turn(wish, carrier_end)
         rounds = self._rounds
@@ -143,7 +137,7 @@ class Auction(BusyChannel):
             self._wants.told(self._own_id, None, earliest)
         if rounds.go_on(place, carrier_end):
             self._nobody_came(place.begin, carrier_end)
-        self._count_fruitless(place)
+        self._disturbance.count(place.fruitless, place.start)
         if place.number == 0:
             return self._challenge(wish, place)
         if not place.is_contested:
@@ -167,8 +161,8 @@ class Auction(BusyChannel):
         # Told by its end, as its begin is not known; no other burst is in between.
         self._before = self._asked, self._wants.silent_since(self._own_id)
         self._wants.on_air(self._own_id, end)
-        self._contest, self._fruitless = None, 0
-        self._all_agree()
+        self._contest = None
+        self._disturbance.burst()
         self._asked = self._wants.n_bursts, end
 
     def not_sent(self, start: float) -> None:
@@ -188,35 +182,23 @@ class Auction(BusyChannel):
             self._mute.add(src, at)
 
     def notices(self, now: float) -> list[str]:
-        """Sentences on robots that use another access policy."""
+        """Sentences on robots that use another access policy, or always want urgent."""
         mute = [
             f"robot {src} takes no part in the auction and this robot does: their bursts collide; "
             "give both the same [access]"
             for src in self._mute.lately(now, MUTE)
         ]
-        return super().notices(now) + mute
+        return super().notices(now) + mute + self._wants.urgent.notices(now)
 
     def _look(self, sensed: Sensed) -> None:
         """Note what has ended since the last time: a burst that told something, or not."""
         end = sensed.carrier_end
         if end <= self._looked_at:
             return
-        self._looked_at, self._fruitless = end, 0
-        self._all_agree()
+        self._looked_at = end
+        self._disturbance.burst()
         if sensed.carrier_at != self._told_at:
             self._wants.missed(end)
-
-    def _count_fruitless(self, place: Place) -> None:
-        self._fruitless += place.fruitless
-        if self._fruitless >= FRUITLESS:
-            self._is_first = place.start > self._disturbed_at + DISTURBED_S
-            self._disturbed_at, self._fruitless = place.start, 0
-            self._disturbed_until = place.start + DISTURBED_S
-
-    def _all_agree(self) -> None:
-        """Use pulses again after the first burst, as all count from its end."""
-        if self._is_first:
-            self._disturbed_until = -inf
 
     def _nobody_came(self, now: float, since: float) -> None:
         """Forget what the robot wants that was to send next, as it did not.
@@ -235,9 +217,8 @@ class Auction(BusyChannel):
         if not self._challenges(wish, place):
             return None
         qos = min(wish.qos, Qos.LATENCY) if self._has_waited(STARVED) else wish.qos
-        has_waited = self._has_waited(PATIENCE)
-        contest = Contest(qos, self._rank, len(self._nodes), has_waited=has_waited)
-        self._contest = place.begin, contest
+        waited = self._has_waited(PATIENCE)
+        self._contest = place.begin, Contest(qos, self._rank, len(self._nodes), has_waited=waited)
         # Who is next anyway sends, unless somebody else challenges.
         return None if self._is_next(wish, place) else self._pulse(place.start)
 
@@ -257,8 +238,9 @@ class Auction(BusyChannel):
             return wants.is_unsure(self._own_id, wish.earliest)
         if first.qos > Qos.URGENT and self._has_waited(STARVED):
             return True
-        is_unknown = wants.of(self._own_id, since) is None
-        return wish.qos <= first.qos and is_unknown and self._has_waited(PATIENCE)
+        is_unknown = wants.lacks(self._own_id, wish.qos, priority, since)
+        is_long = self._has_waited(PATIENCE) or wants.goes_again(first, priority, self._asked[0])
+        return wish.qos <= first.qos and is_unknown and is_long
 
     def _in_contest(self, wish: Wish, place: Place, pulses: Sequence[float]) -> Slot | None:
         """What we do in a round with a challenge."""

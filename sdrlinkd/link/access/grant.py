@@ -8,7 +8,6 @@ plan costs turns and never a collision.
 from collections.abc import Sequence
 from math import inf
 from random import Random
-from struct import pack
 
 from sdrlinkd.link.access.base import BusyChannel, Slot, Wish
 from sdrlinkd.link.access.by_request import ByRequest
@@ -26,7 +25,7 @@ from sdrlinkd.link.access.team import Team
 from sdrlinkd.link.access.turns import ALMOST_S
 from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
-from sdrlinkd.wire import ANYBODY, LAST_PLAN, WANT_SIZE, Frame, Record, RecordType, crc16
+from sdrlinkd.wire import ANYBODY, LAST_PLAN, WANT_SIZE, Frame, Record
 from sdrlinkd.wire import Grant as GrantRecord
 from sdrlinkd.wire import Want as WantRecord
 
@@ -56,9 +55,7 @@ class Grants(BusyChannel):
         self._gap_s = gap_s
         self.round_s = times.round_s(len(nodes))
         self.share = times.budget_s / len(nodes) / self.round_s
-        micro = [round(1e6 * each) for each in (*times.ticks, times.turn_s, times.budget_s)]
-        self._schedule = crc16(pack(">BIIII", RecordType.GRANT, *micro) + bytes(sorted(nodes)))
-        self._frames = HeardFrames(nodes, self._schedule)
+        self._frames = HeardFrames(nodes, times.schedule(nodes))
         self._strays = Strays()
         self._team = Team(own_id, nodes)
         begin_s = times.turn_s + times.ticks.guard_s + times.react_s
@@ -66,15 +63,13 @@ class Grants(BusyChannel):
         """Whose plans are kept."""
         self._planner = Planner(own_id, self._team, times)
         self._request = OwnRequest(own_id, times, self.round_s)
-        self._rounds = KnownRounds(own_id, times.turn_s, times.root_s)
+        self._rounds = KnownRounds(own_id, times, len(nodes))
         self._behind: dict[int, WantRecord] = {}
         """Requests to pass on to the root."""
         self._open = OpenTurns(rng)
         self._asked_at = -inf  # Or when we heard somebody last.
-        self.ends = False
-        """As the root: whether the next plan is the last one."""
-        self.has_ended = False
-        """Whether it was told or heard."""
+        self.ends = self.has_ended = False
+        """Whether our next plan is the last one; and whether a last one was told or heard."""
 
     @property
     def state(self) -> str:
@@ -176,13 +171,16 @@ class Grants(BusyChannel):
 
     def request(self, start: float, left: Waiting | None) -> WantRecord | None:
         """What to ask the root for, unless it knows."""
-        if self.leads.is_root or left is None:
-            return None
-        return self._request.of(left, start)
+        if self.leads.is_root:
+            self._rounds.urgent.waits(left, start)
+        elif left is not None:
+            return self._request.of(left, start)
+        return None
 
     def requested(self, want: WantRecord, start: float) -> None:
         """Note what the root knows from now on."""
         self._request.told(want, start)
+        self._rounds.urgent.asks(want, start)
 
     def told(self, start: float, length_s: float, room: int) -> list[Record]:
         """The plan of the next round, or the one that we pass on, with requests to pass on."""
@@ -195,12 +193,12 @@ class Grants(BusyChannel):
             if self.ends:
                 grant, self.has_ended = grant._replace(turns=LAST_PLAN), True
             self._rounds.made(made)
-            return [Frame(self._own_id, 0, self._schedule, 0), grant]
+            return [Frame(self._own_id, 0, self._frames.schedule, 0), grant]
         records: list[Record] = []
         plan = self._rounds.pass_on() if self._must_pass_on() else None
         if plan is not None:
             phase_us = max(0, round(1e6 * (start - plan[0])))
-            records += [Frame(leads.root, leads.level, self._schedule, phase_us), plan[1]]
+            records += [Frame(leads.root, leads.level, self._frames.schedule, phase_us), plan[1]]
             room -= PLAN_SIZE
         for node in [*self._behind][: room // WANT_SIZE]:
             records.append(self._behind.pop(node))
@@ -243,6 +241,7 @@ class Grants(BusyChannel):
         """Take what a robot wants, or pass it on to the root."""
         if want.node not in self._team.nodes or want.node == self._own_id:
             return
+        self._rounds.urgent.asks(want, at)
         if self.leads.is_root:
             self._planner.take(want, at)
         elif self._team.places(self.leads.root).is_behind(want.node, self._own_id):
@@ -269,8 +268,9 @@ class Grants(BusyChannel):
                 self.ahead_s = min(max(0.0, found.begin - last.begin), self.round_s)
 
     def notices(self, now: float) -> list[str]:
-        """Sentences on robots that keep another schedule, or none."""
-        return self._frames.notices(self.state, now) + self._strays.notices(now)
+        """Sentences on robots that keep another schedule, or none, or always want urgent."""
+        found = self._frames.notices(self.state, now) + self._strays.notices(now)
+        return found + self._rounds.urgent.notices(now)
 
     def begin(self, wish: Wish, start: float) -> Slot:
         """Plan from our burst at `start` on, where nobody did so before."""

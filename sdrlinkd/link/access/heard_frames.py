@@ -11,7 +11,8 @@ class HeardFrames:
 
     def __init__(self, nodes: Collection[int], schedule: int) -> None:
         self._nodes = nodes
-        self._schedule = schedule
+        self.schedule = schedule
+        """What identifies our schedule."""
         self._last: tuple[int, float, Frame] | None = None
         """The last FRAME of our schedule, as (who told it, when, what)."""
         self._strangers, self._outsiders = Sightings(), Sightings()
@@ -22,7 +23,7 @@ class HeardFrames:
         if src not in self._nodes or frame.root not in self._nodes:
             # It may be anybody's; those in `nodes` are who share the channel.
             self._outsiders.add(src, at)
-        elif frame.schedule != self._schedule:
+        elif frame.schedule != self.schedule:
             self._strangers.add(src, at)
         else:
             self._strangers.clear(src)

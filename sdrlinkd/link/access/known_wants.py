@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from math import inf
 from typing import NamedTuple
 
+from sdrlinkd.link.access.always_urgent import AlwaysUrgent
 from sdrlinkd.link.access.requests import Waiting
 from sdrlinkd.link.access.team import PRESENT_S
 from sdrlinkd.link.qos import Qos
@@ -28,11 +29,15 @@ class Wanted(NamedTuple):
 class KnownWants:
     """What is known of the robots `nodes`; those that heard the same bursts know the same."""
 
-    def __init__(self, nodes: Iterable[int]) -> None:
+    def __init__(self, own_id: int, nodes: Iterable[int]) -> None:
         self._nodes = frozenset(nodes)
+        self.urgent = AlwaysUrgent(own_id, len(self._nodes))
+        """Who always wants urgent; air counts in bursts."""
         self._wanted: dict[int, Wanted] = {}
         self._on_air_at: dict[int, float] = {}
         """When each robot was on the air last."""
+        self._burst_of: dict[int, int] = {}
+        """The number of the last burst of each robot."""
         self.n_bursts = 0
         """Count of bursts so far."""
         self._missed_at = -inf
@@ -49,6 +54,8 @@ class KnownWants:
             return False
         self._on_air_at[node] = at
         self.n_bursts += 1
+        self._burst_of[node] = self.n_bursts
+        self._note_urgent(node, at)
         return True
 
     def silent_since(self, node: int) -> float:
@@ -100,6 +107,32 @@ class KnownWants:
     def in_order(self) -> list[int]:
         """All robots; whoever was silent for longest comes first."""
         return sorted(self._nodes, key=lambda node: (self._on_air_at.get(node, -inf), node))
+
+    def lacks(self, own: int, qos: Qos, priority: int, now: float) -> bool:
+        """Whether the others do not know that our robot wants something as urgent as that."""
+        known = self.of(own, now)
+        return known is None or not known.is_before(qos, priority)
+
+    def goes_again(self, first: Wanted, priority: int, since_n: int) -> bool:
+        """Whether the robot that is next has had the `since_n`-th burst, or a later one.
+
+        This counts if it has more than its share of the air for urgent messages, and for such
+        messages of that priority. So a robot that rarely has some need not wait for it.
+        """
+        is_equal = first.qos is Qos.URGENT and first.priority == priority
+        is_again = self._burst_of.get(first.node, -1) >= since_n
+        return is_equal and is_again and self.urgent.has_more(first.node)
+
+    def _note_urgent(self, node: int, at: float) -> None:
+        """Note a burst of a robot, and who wants urgent meanwhile."""
+        urgent = {
+            each for each in self._wanted
+            if (wanted := self.of(each, at)) is not None and wanted.qos is Qos.URGENT
+        }  # fmt: skip
+        self.urgent.passed(1)
+        if node in urgent:
+            self.urgent.had(node, 1)
+        self.urgent.look(urgent, at)
 
     def _begin(self, at: float) -> None:
         if self._began_at is None:

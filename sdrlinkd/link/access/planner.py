@@ -7,7 +7,16 @@ from math import inf
 from sdrlinkd.link.access.base import Slot, Wish
 from sdrlinkd.link.access.requests import Due, Requests, Waiting
 from sdrlinkd.link.access.reuse import stages, told
-from sdrlinkd.link.access.round_plan import MOST_TOLD, SPARE_TURNS, Times, before, plan, shares
+from sdrlinkd.link.access.round_plan import (
+    MOST_TOLD,
+    SPARE_TURNS,
+    Account,
+    Times,
+    account,
+    before,
+    plan,
+    shares,
+)
 from sdrlinkd.link.access.team import Team
 from sdrlinkd.link.access.turns import ALMOST_S, Round
 from sdrlinkd.link.qos import Qos
@@ -33,8 +42,8 @@ class Planner:
         self._requests = Requests()
         self._served_at: dict[int, float] = {}
         """When each robot had its last turn."""
-        self._had_s: dict[int, float] = {}
-        """Airtime in s for what is not urgent that each robot was given lately."""
+        self._had_s: dict[Account, float] = {}
+        """Airtime in s beyond the least turns that each robot was given lately."""
         self._number = 0
         self._own_since = inf
         """Since when we have something to send; infinity: nothing."""
@@ -45,6 +54,8 @@ class Planner:
         """When our next turn begins."""
         self._turn_began, self._turn_end = -inf, -inf
         """When it began and ends, if it takes several bursts."""
+        self._own: Waiting | None = None
+        """What waited here when it began."""
         self.tells = True
         """Whether our next burst tells a plan."""
 
@@ -87,6 +98,7 @@ class Planner:
         self._own_since = min(self._own_since, start) if wish.waiting else inf
         end = self._turn_end
         if not self._turn_began <= start < end:
+            self._own = wish.waiting
             if wish.waiting is None:
                 end = start + times.turn_s
             else:
@@ -115,8 +127,8 @@ class Planner:
         used_s = max(0.0, before_s + length_s - 2 * times.turn_s)
         rest_s = max(0.0, times.budget_s - used_s)
         kept = math.exp((self._made_at - start) / LATELY_S)
-        self._had_s = {node: kept * had_s for node, had_s in self._had_s.items()}
-        self._had_s[self._own_id] = self._had_s.get(self._own_id, 0.0) + used_s
+        self._had_s = {each: kept * had_s for each, had_s in self._had_s.items()}
+        self._note_had(self._own_id, self._own, used_s)
         given = shares(times._replace(budget_s=rest_s), wanted, self._had_s)
         after_s = max(length_s + times.ticks.guard_s, times.turn_s + times.react_s)
         if last is not None:
@@ -126,7 +138,7 @@ class Planner:
         ticks, places = times.ticks, team.places(self._own_id)
         is_absent = len(present) + 1 < len(team.nodes)
         turns = plan(
-            times, begin, present, given, wanted, places, self._served_at,
+            times, begin, present, given, places, self._served_at,
             is_open=is_absent and (not wanted or self._is_overdue(ANYBODY, begin)),
         )  # fmt: skip
         uses = {node: ticks.count(times.turn_s + each.all_s) for node, each in wanted.items()}
@@ -199,10 +211,13 @@ class Planner:
         before_s = dues[0].at - start - times.ticks.guard_s
         return min(length_s, max(2 * times.turn_s + urgent_s, before_s))
 
-    def _note_had(self, node: int, waiting: Waiting, given_s: float) -> None:
-        """Note airtime that a robot was given, as far as it is not for something urgent."""
-        urgent_s = waiting.air_s * (waiting.qos <= Qos.LATENCY)
-        self._had_s[node] = self._had_s.get(node, 0.0) + max(0.0, given_s - urgent_s)
+    def _note_had(self, node: int, waiting: Waiting | None, given_s: float) -> None:
+        """Note airtime that a robot was given for what waited there, by class."""
+        first_s = 0.0 if waiting is None else max(0.0, min(given_s, waiting.air_s))
+        first = Qos.BULK if waiting is None else waiting.qos
+        for qos, had_s in ((first, first_s), (Qos.BULK, max(0.0, given_s - first_s))):
+            of = account(node, qos)
+            self._had_s[of] = self._had_s.get(of, 0.0) + had_s
 
     def _wanted(self, now: float) -> dict[int, Waiting]:
         requests = self._requests

@@ -8,14 +8,15 @@ the robot that passes the plan on to them.
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf
+from struct import pack
 from typing import NamedTuple
 
-from sdrlinkd.link.access.requests import Due, Waiting, rank
+from sdrlinkd.link.access.requests import Due, Waiting
 from sdrlinkd.link.access.reuse import Stage, beside, told
 from sdrlinkd.link.access.team import Places
 from sdrlinkd.link.access.turns import Ticks
 from sdrlinkd.link.qos import MIDDLE_PRIORITY, Qos
-from sdrlinkd.wire import ANYBODY, FRAME_SIZE, GRANT_OVERHEAD, MAX_AIR, TURN_SIZE
+from sdrlinkd.wire import ANYBODY, FRAME_SIZE, GRANT_OVERHEAD, MAX_AIR, TURN_SIZE, RecordType, crc16
 
 MOST_TURNS = 8
 """Most robots with a turn in one round, beside the root."""
@@ -29,6 +30,15 @@ LEAST_TURNS = MOST_TOLD - 1 - 2
 """Least turns of a round in which two robots share the budget; one turn may be for anybody."""
 STANDS = 0.5
 """Share of a round's budget that passes between two turns of a robot that does not want any."""
+
+
+Account = tuple[int, Qos]
+"""Airtime is counted by robot and class; default and bulk count as one."""
+
+
+def account(node: int, qos: Qos) -> Account:
+    """Where airtime of a robot for a class is counted."""
+    return node, min(qos, Qos.DEFAULT)
 
 
 class Times(NamedTuple):
@@ -45,6 +55,11 @@ class Times(NamedTuple):
     """From the last turn until that of the root, which forwards what it has heard."""
     react_s: float
     """From the end of the PDU with the plan until the first turn, at least."""
+
+    def schedule(self, nodes: Collection[int]) -> int:
+        """What identifies the schedule of the robots `nodes`."""
+        micro = [round(1e6 * each) for each in (*self.ticks, self.turn_s, self.budget_s)]
+        return crc16(pack(">BIIII", RecordType.GRANT, *micro) + bytes(sorted(nodes)))
 
     def round_s(self, n: int) -> float:
         """The longest round of `n` robots, some of which pass plans on, with the root's turn."""
@@ -72,20 +87,22 @@ class Times(NamedTuple):
 def shares(
     times: Times,
     waiting: Mapping[int, Waiting],
-    had_s: Mapping[int, float],
+    had_s: Mapping[Account, float],
 ) -> dict[int, float]:
     """The airtime in s that each robot gets beyond its least turn, of those that want more.
 
-    Nobody's bulk comes before what is urgent for others. Where the class is not urgent, the robot
-    comes first that had the least airtime for that lately, `had_s`. Ages would not do, as a relay
-    does not know those of all messages.
+    They are in order. Nobody's bulk comes before what is urgent for others. Of those with the same
+    class and priority, the robot comes first that had the least airtime for that lately, `had_s`.
+    So whoever always has something urgent does not go before who rarely has. Among those that had
+    none, what is urgent goes by age; a relay does not know the ages of all other messages.
     """
     parts = []
     for node, each in waiting.items():
-        is_urgent = each.qos <= Qos.LATENCY
-        since = -each.age_s if is_urgent else had_s.get(node, 0.0)
-        parts.append((each.qos, -each.priority, since, node, each.air_s))
-        parts.append((Qos.BULK, -MIDDLE_PRIORITY, had_s.get(node, 0.0), node, each.lower_air_s))
+        had = had_s.get(account(node, each.qos), 0.0)
+        since = -each.age_s if each.qos <= Qos.LATENCY else 0.0
+        parts.append((each.qos, -each.priority, had, since, node, each.air_s))
+        had = had_s.get(account(node, Qos.BULK), 0.0)
+        parts.append((Qos.BULK, -MIDDLE_PRIORITY, had, 0.0, node, each.lower_air_s))
     left_s, given = times.budget_s, dict[int, float]()
     for *_, node, part_s in sorted(parts):
         given_s = min(part_s, left_s)
@@ -100,7 +117,6 @@ def plan(
     begin: float,
     present: Collection[int],
     given: Mapping[int, float],
-    waiting: Mapping[int, Waiting],
     places: Places,
     served_at: Mapping[int, float],
     *,
@@ -108,8 +124,8 @@ def plan(
 ) -> list[tuple[int, int]]:
     """The turns of a round from `begin` on in order, as (robot, ticks), after the root's own.
 
-    `present` are the other robots, `given` what some get beyond the least turn. `served_at` tells
-    when each had its last turn. With `is_open`, there is a turn for anybody else.
+    `present` are the other robots, `given` what some get beyond the least turn, in order.
+    `served_at` tells when each had its last turn. With `is_open`, there is a turn for anybody else.
     """
     count, guard_s = times.ticks.count, times.ticks.guard_s
     tellers = set(places.parents.values())
@@ -128,7 +144,7 @@ def plan(
                 found.append(by)
         return sorted(found, key=lambda node: places.levels.get(node, 1))
 
-    runs = heard(sorted(given, key=lambda node: (*_urgency(waiting.get(node)), node)))
+    runs = heard([*given])
     turns = [(node, ticks(node)) for node in runs]
     ends = {turn.node: turn.end for turn in times.ticks.round(0, begin, turns).turns}
     end = max(ends.values(), default=begin)
@@ -144,10 +160,6 @@ def plan(
     rest = heard(sorted(rest[: max(0, most)]), runs)
     turns += [(node, count(times.turn_s * (1 + (node in tellers)))) for node in rest]
     return [*turns, (ANYBODY, count(times.turn_s))] if is_open else turns
-
-
-def _urgency(wants: Waiting | None) -> tuple[object, ...]:
-    return (len(Qos), 0, 0.0) if wants is None else rank(wants)
 
 
 def before(

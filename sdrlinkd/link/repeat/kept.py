@@ -60,6 +60,8 @@ class Kept(NamedTuple):
 
     def expires_at(self) -> float:
         """When all messages in it have outlived their lifespans."""
+        if len(self.carried) == 1:
+            return self.carried[0].expires_at
         return max(message.expires_at for message in self.carried)
 
     def is_for(self, robot: int) -> bool:

@@ -319,6 +319,9 @@ class BurstScheduler:
         wakes_at = self._composer.next_wakeup(now)
         if wakes_at <= now and self._held.is_settled:
             wakes_at = self._held.until
+        if wakes_at <= now:
+            # Nothing else is needed, and this is asked often.
+            return max(wakes_at, self._numbers_at)
         wakes_at = min(self._control_records.due_at, wakes_at, self._answers.due_at(now))
         lead_s, tells_at = self._fit.lead_s, self._access.tells_at
         if self._turns is not None:
