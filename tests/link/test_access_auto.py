@@ -64,9 +64,9 @@ def test_who_only_receives_takes_no_turns(policy):
     assert (found.policy, found.reason) == ("none", "because this radio only receives")
 
 
-def test_minislots_where_the_radio_reacts_within_a_millisecond_else_turns_by_request():
+def test_minislots_where_the_radio_reacts_within_a_millisecond_else_slots():
     soon, late = settled(auto([1, 2]), SOON), settled(auto([1, 2]), PACED)
-    assert (soon.policy, late.policy) == ("minislot", "grant")
+    assert (soon.policy, late.policy) == ("minislot", "tdma")
     assert "takes 0.184 ms" in soon.reason
     assert (
         "takes 6.08 ms to notice another robot's burst; minislot allows at most 1 ms" in late.reason
@@ -84,15 +84,22 @@ def test_an_auction_from_three_robots_on_if_the_radio_sends_pulses_and_pdus_have
     assert settled(three, SOON).policy == "minislot"
     assert settled(three, QUICK, room=44).policy == "minislot"
     late = settled(three, QUICK._replace(react_s=0.002))
-    assert late.policy == "grant"
+    assert late.policy == "tdma"
     assert "auction allows at most 1 ms" in late.reason
     assert all(settled(auto([*range(n)]), QUICK).policy == "auction" for n in range(3, 33))
 
 
-def test_slots_where_turns_by_request_are_not_for_the_radio():
-    assert settled(auto([1, 2]), USRP).policy == "grant"
-    assert settled(auto([1, 2]), USRP, room=44).policy == "tdma"
-    windows = USRP._replace(tx_window_s=1.0, rx_window_s=0.25)
+def test_turns_by_request_where_all_have_one_sooner_than_a_slot():
+    slow = USRP._replace(turnaround_s=0.05)
+    for n in (2, 5, 8):
+        found = settled(auto([*range(1, n + 1)]), slow)
+        slots = settled(params("tdma", range(1, n + 1)), slow)
+        assert found.policy == "grant"
+        assert found.access.round_s < slots.access.round_s
+        assert "all have had a turn after" in found.reason
+    assert settled(auto([1, 2]), USRP).policy == "tdma"
+    assert settled(auto([1, 2]), slow, room=44).policy == "tdma"
+    windows = slow._replace(tx_window_s=1.0, rx_window_s=0.25)
     assert settled(auto([1, 2]), windows).policy == "tdma"
 
 
@@ -162,12 +169,10 @@ def test_a_link_refuses_it_at_attach_and_reports_what_it_came_to():
         link.attach(USRP, params("minislot", [1, 2], force=False), RateParams())
     settled = link.attach(USRP, auto([1, 2]), RateParams()).settled
     report = link.report(0.0)
-    assert report.access.startswith("grant: 2 robots")
-    share = round(report.access_share_pct)
-    assert (report.access_policy, share > 60) == ("grant", True)
+    assert report.access.startswith("tdma: 2 slots")
+    assert (report.access_policy, round(report.access_share_pct)) == ("tdma", 97)
     assert report.access_reason.startswith("because this radio takes")
-    said = f"grant, {report.access_reason}; {share} % of the airtime is usable"
-    assert settled.sentence == said
+    assert settled.sentence == (f"tdma, {report.access_reason}; 97 % of the airtime is usable")
 
 
 def test_turns_by_request_need_room_for_a_plan():

@@ -85,7 +85,7 @@ class Auction(BusyChannel):
         """That, and when we were on the air, before our last burst."""
 
     @property
-    def by_auction(self) -> ByAuction:
+    def by_auction(self) -> ByAuction:  # type: ignore[override]
         """This policy."""
         return self
 

@@ -1,6 +1,8 @@
 """Chooses the access policy that fits the radio, by the share of airtime that each can use."""
 
+import math
 from collections.abc import Mapping
+from contextlib import suppress
 from math import inf
 from random import Random
 from typing import Literal, NamedTuple
@@ -9,10 +11,9 @@ import msgspec
 
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link.access.base import Access
-from sdrlinkd.link.access.by_hearing import ByHearing
 from sdrlinkd.link.access.choice import MANY, check_access, make_access, make_free, reaction_s
-from sdrlinkd.link.access.grant import Grants
 from sdrlinkd.link.access.params import AccessParams
+from sdrlinkd.link.access.round_plan import MOST_TURNS
 from sdrlinkd.link.traits import PduLinkTraits
 
 SOON_S = 0.001
@@ -64,11 +65,12 @@ def settle(
     if not traits.transmits:
         # Who never sends needs no turn, whatever the others do.
         policy, reason = "none", "because this radio only receives"
-    shares: dict[str, float] = {}
+    possible: dict[str, Access] = {}
     if policy != "none" and (policy == "csma" or _others(params, own_id)):
-        shares = air_shares(params, own_id, traits, longest_burst_s)
+        possible = _possible(params, own_id, traits, longest_burst_s)
+    shares = {each: access.carries(longest_burst_s) for each, access in possible.items()}
     if policy == "auto":
-        policy, reason = _chosen(params, own_id, traits, shares, room)
+        policy, reason = _chosen(params, own_id, traits, possible, shares, room)
     if policy == "none":
         is_alone = params.policy == "auto" and traits.senses and traits.shares_air
         access: Access = make_free(traits, is_alone)
@@ -90,23 +92,19 @@ def may_share(params: AccessParams, own_id: int) -> bool:
     return params.policy != "none"
 
 
-def air_shares(
+def _possible(
     params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float
-) -> dict[str, float]:
-    """The share of airtime that each policy can use with the radio's times; 0: unsupported."""
-    shares: dict[str, float] = {}
+) -> dict[str, Access]:
+    """The policies that the radio supports, with times that follow from it."""
+    found: dict[str, Access] = {}
     policies: tuple[Policy, ...] = ("csma", "minislot", "auction", "tdma", "grant")
     # csma does not need `nodes`; without them, assume one other robot.
     nodes = params.nodes or [own_id, (own_id + 1) % 255]
     for policy in policies:
         wanted = AccessParams(policy=policy, nodes=nodes, persist=params.persist)
-        try:
-            made = make_access(wanted, own_id, traits, longest_burst_s, Random(0))
-        except ConfigError:
-            shares[policy] = 0.0
-        else:
-            shares[policy] = made.carries(longest_burst_s)
-    return shares
+        with suppress(ConfigError):
+            found[policy] = make_access(wanted, own_id, traits, longest_burst_s, Random(0))
+    return found
 
 
 def percent(share: float) -> str:
@@ -119,8 +117,9 @@ def _others(params: AccessParams, own_id: int) -> set[int]:
 
 
 def _chosen(
-    params: AccessParams, own_id: int, traits: PduLinkTraits, shares: Mapping[str, float], room: int
-) -> tuple[Policy, str]:
+    params: AccessParams, own_id: int, traits: PduLinkTraits, possible: Mapping[str, Access],
+    shares: Mapping[str, float], room: int,
+) -> tuple[Policy, str]:  # fmt: skip
     """The (policy, reason) that `auto` chooses for this radio."""
     if not (traits.shares_air and traits.senses):
         return "none", f'because no other robot shares the backend "{traits.kind}"'
@@ -128,22 +127,29 @@ def _chosen(
         return "none", "because access.nodes lists no other robot"
     apart_s, n = reaction_s(traits), len(set(params.nodes))
     reacts = f"because this radio takes {1e3 * apart_s:.3g} ms to notice another robot's burst"
+    fair = {each for each in shares if shares[each] >= FAIR * max(shares.values())}
+    has_room = {each for each, access in possible.items() if room >= access.least_room}
     # Two robots have so few mini-slots that these cost less than a contest.
-    has_auction = shares["auction"] and n >= MANY and room >= ByHearing.least_room
-    quick: Policy = "auction" if has_auction else "minislot"
-    # In TX windows, a turn may be longer than the radio can send at a time.
-    least = FAIR * max(shares.values())
-    has_room = room >= Grants.least_room and traits.tx_window_s == inf
-    has_grant = has_room and shares["grant"] >= least
-    steady: Policy = "grant" if has_grant else "tdma"
+    quick: Policy = "auction" if n >= MANY and "auction" in has_room else "minislot"
+    if apart_s <= SOON_S and quick in fair:
+        return quick, reacts
     if apart_s > SOON_S:
-        return steady, f"{reacts}; {quick} allows at most {1e3 * SOON_S:g} ms"
-    if shares[quick] < least:
-        return steady, (
+        why = f"{reacts}; {quick} allows at most {1e3 * SOON_S:g} ms"
+    else:
+        why = (
             f"because with {n} robots {quick} leaves {percent(shares[quick])} of the airtime "
-            f"usable and {steady} {percent(shares[steady])}"
+            f"usable and tdma {percent(shares['tdma'])}"
         )
-    return quick, reacts
+    # In TX windows, a turn may be longer than the radio can send at a time.
+    may_grant = "grant" in has_room & fair and traits.tx_window_s == inf
+    grant_s = possible["grant"].round_s * math.ceil((n - 1) / MOST_TURNS)
+    tdma_s = possible["tdma"].round_s
+    if may_grant and grant_s < tdma_s:
+        return "grant", (
+            f"{why}; all have had a turn after {1e3 * grant_s:.3g} ms, and in tdma after "
+            f"{1e3 * tdma_s:.3g} ms"
+        )
+    return "tdma", why
 
 
 def _refuse_poor(settled: Settled, n: int) -> None:

@@ -185,20 +185,9 @@ class BusyChannel:
     least_room = 0
     needs_links = False
 
-    @property
-    def tells_at(self) -> float:
-        """Infinity, as there is nothing to tell."""
-        return inf
-
-    @property
-    def by_request(self) -> ByRequest | None:
-        """None, as nobody asks for turns."""
-        return None
-
-    @property
-    def by_auction(self) -> ByAuction | None:
-        """None, as bursts do not tell what comes next."""
-        return None
+    tells_at = inf
+    by_request: ByRequest | None = None
+    by_auction: ByAuction | None = None
 
     def __init__(self) -> None:
         self._own_ends = [NEVER]

@@ -104,7 +104,7 @@ class Grants(BusyChannel):
         return self._times.carries(len(self._team.nodes)) * burst_s / (burst_s + self._gap_s)
 
     @property
-    def by_request(self) -> ByRequest:
+    def by_request(self) -> ByRequest:  # type: ignore[override]
         """This policy."""
         return self
 
@@ -119,7 +119,7 @@ class Grants(BusyChannel):
         return self.leads.level > 1
 
     @property
-    def tells_at(self) -> float:
+    def tells_at(self) -> float:  # type: ignore[override]
         """Time from which we must be asked, as others wait for the plan."""
         if self.leads.is_root:
             return self._planner.tells_at - self._look_s

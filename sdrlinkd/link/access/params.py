@@ -13,7 +13,7 @@ class AccessParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     policy: Literal["auto", "none", "csma", "minislot", "auction", "tdma", "grant"] = "auto"
     """Access policy; auto: none if `nodes` lists no other robot; minislot for two and auction for
-    more, if the radio reacts fast enough; else grant."""
+    more, if the radio reacts fast enough; else grant or tdma, whose turns come sooner."""
     nodes: list[Annotated[int, Meta(ge=0, le=254)]] = []
     """Ids of the robots that share the channel, in the same order at all robots; for all policies
     but none and csma."""

@@ -131,11 +131,6 @@ class BurstScheduler:
         )  # fmt: skip
         self._composer.leave_room(b"" if by_auction is None else ROOM)
 
-    def _follow_policy(self) -> None:
-        """Adopt what the access policy has become."""
-        if self._adopted != (self._access.by_request, self._access.by_auction):
-            self._adopt()
-
     def more_to_send(self) -> None:
         """Revise the decision to keep the channel free, as a message has come."""
         if self._held.is_settled:
@@ -143,7 +138,8 @@ class BurstScheduler:
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next, decided now; None: nothing to send, or not yet."""
-        self._follow_policy()
+        if self._adopted != (self._access.by_request, self._access.by_auction):
+            self._adopt()
         if self._retry.waiting:
             return self._again(opportunity)
         earliest, airtime_s, _, sensed, _ = opportunity
@@ -185,9 +181,10 @@ class BurstScheduler:
         start = slot.start
         if slot.is_pulse:
             return self._pulse(start, qos)
-        # The team may go on by request from this burst on.
-        self._follow_policy()
-        turns = self._turns
+        if self._adopted != (access.by_request, access.by_auction):
+            # The team goes on by request from this burst on.
+            self._adopt()
+            turns = self._turns
         sealing = self._sealing
         if sealing.is_on and not self._may_seal(start, MAX_PDUS):
             return None
