@@ -43,6 +43,8 @@ class Flow:
         self.robots: frozenset[int] = frozenset()
         """Who forwards next."""
         self.hops: frozenset[int] = frozenset()
+        self.tellers: frozenset[int] = frozenset()
+        """Who names us to forward it."""
         self.sent_at = -inf
         self.told_at = -inf
         """When ROUTE was made last."""
@@ -66,11 +68,11 @@ class Flow:
         self._wait_s: dict[int, tuple[float, float]] = {}
         """(mean, mean deviation) of the time of an answer, by robot."""
 
-    def sent(self, number: int, hops_left: int, at: float) -> None:
-        """Note that a PDU has left; again, if it was repeated."""
+    def sent(self, number: int, hops_left: int, at: float, *, is_bare: bool = False) -> None:
+        """Note that a PDU has left; again, if it was repeated. Nobody answers for a bare one."""
         self.sent_at, self.hops_left = at, hops_left
         number = self._newest = heard_number(self._newest, number)
-        if not self.hops:
+        if not self.hops or is_bare:
             return
         for i, known in enumerate(self._sent):
             if known.number == number:

@@ -1,0 +1,57 @@
+"""When a route goes around a robot, when it must not, and which way it then takes."""
+
+from random import Random
+
+from sdrlinkd.link import Overrides
+from tests.link.test_routes import flows, mesh
+
+PERIOD_S = 0.02
+
+
+def going_around(air):
+    return {robot: link.report(air.now).routes.going_around for robot, link in air.links.items()}
+
+
+def test_nobody_is_gone_around_for_pdus_that_hold_only_records():
+    """Nobody answers for these, so a relay must not wait for answers to them."""
+    air = mesh((1, 2), (2, 3), (2, 4), (3, 5), (4, 6))
+    for _ in range(40):
+        air.run(air.now + 0.25)
+        assert not any(going_around(air).values())
+    assert any(pdu[1] == 1 for _, src, burst in air.bursts if src == 3 for pdu in burst.pdus)
+
+
+def test_a_detour_does_not_lead_back_to_the_source():
+    """Robot 4 does not know that robot 1 goes around 2, and its own best path leads there."""
+    air = mesh((1, 2), (2, 3), (1, 4), (4, 5), (5, 6), (6, 7), (7, 3))
+    air.run(2.5)
+    overrides = Overrides(dst=3)
+    air.flow(1, 20, every_s=PERIOD_S, overrides=overrides)
+    broke_at = air.now
+    air.hears -= {(2, 1)}
+    air.flow(1, 60, every_s=PERIOD_S, first=20, overrides=overrides)
+    air.run(air.now + 0.5)
+    assert sorted(air.numbers(3)) == list(range(80))
+    late_s = max(age_s for _, number, age_s, _ in air.got if air.sent_at[number] > broke_at)
+    assert late_s < 0.5
+
+
+def test_no_detour_over_links_that_lose_nearly_all():
+    """Robot 1 does not hear what 2 forwards and answers. All the same, 2 is the way."""
+    rng = Random(1)
+    is_deaf = False
+
+    def lost(to, src, _n, _pdu):
+        return (4 in (to, src) and rng.random() < 0.9) or (is_deaf and (to, src) == (1, 2))
+
+    air = mesh((1, 2), (2, 3), (1, 4), (4, 3), lost=lost)
+    air.run(4.0)
+    overrides = Overrides(dst=3)
+    air.flow(1, 20, every_s=PERIOD_S, overrides=overrides)
+    is_deaf = True
+    for number in range(20, 80):
+        air.flow(1, 1, every_s=PERIOD_S, first=number, overrides=overrides)
+        assert flows(air, 1)[1, 3] == [2]
+    is_deaf = False
+    air.run(air.now + 1.0)
+    assert sorted(air.numbers(3)) == list(range(80))
