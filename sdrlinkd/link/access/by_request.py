@@ -53,8 +53,16 @@ class ByRequest(Protocol):
     def take_want(self, want: Want, at: float) -> None:
         """Take what a robot wants to send, as told directly in a burst at `at`."""
 
-    def take_grant(self, src: int, grant: Grant, at: float) -> None:
-        """Take the turns that robot `src` told, after a FRAME, in a burst at `at`."""
+    def take_grant(self, src: int, grant: Grant, at: float, *, is_weak: bool = False) -> None:
+        """Take the turns that robot `src` told, after a FRAME, in a burst at `at`.
+
+        `is_weak`: the signal was weaker than PDUs need.
+        """
+
+    def hardly_heard(self, by: int, node: int, at: float) -> None:
+        """Note that robot `by`, we or another one, hears a PDU of robot `node` directly at times,
+        as the signal is weaker than PDUs need.
+        """
 
     def know_links(self, edges: Edges) -> None:
         """Take the links of the team."""

@@ -87,16 +87,9 @@ class Grants(BusyChannel):
     @property
     def state(self) -> str:
         """Policy, times, and whose plans are kept, for people."""
-        leads = self._leads
-        doing = "listening for a plan"
-        if leads.is_root:
-            doing = "planned here"
-        elif leads.follows:
-            doing = f"planned by robot {leads.root}"
-            if leads.level > 1:
-                doing += f", {leads.level} hops away"
-            if self.lacks:
-                doing += f", without {self.lacks}"
+        doing = self._leads.doing
+        if self._leads.follows and self.lacks:
+            doing += f", without {self.lacks}"
         return (
             f"grant: {len(self._team.nodes)} robots, rounds of at most {1e3 * self.round_s:.3g} "
             f"ms, guard {1e3 * self._times.ticks.guard_s:.3g} ms; {doing}"
@@ -233,6 +226,11 @@ class Grants(BusyChannel):
         """Note that robot `by` hears robot `node`."""
         self._team.told_of(node, at, by)
 
+    def hardly_heard(self, by: int, node: int, at: float) -> None:
+        """Note that robot `by` hears robot `node` at times."""
+        self._asked_at = max(self._asked_at, at)
+        self._team.told_of(node, at, by, is_weak=True)
+
     def know_links(self, edges: Edges) -> None:
         """Take the links of the team, as its LSAs tell them."""
         self._team.learn(edges)
@@ -258,7 +256,7 @@ class Grants(BusyChannel):
         elif self._team.places(self._leads.root).is_behind(want.node, self._own_id):
             self._behind[want.node] = want
 
-    def take_grant(self, src: int, grant: GrantRecord, at: float) -> None:
+    def take_grant(self, src: int, grant: GrantRecord, at: float, *, is_weak: bool = False) -> None:
         """Follow a plan of the best root known, as robot `src` told it."""
         if self._frame is None or self._frame[:2] != (src, at):
             return
@@ -267,8 +265,7 @@ class Grants(BusyChannel):
         found = self._times.ticks.round(grant.number, since + 1e-6 * grant.begins_us, grant.turns)
         if not found.is_sound(at, 2 * self.round_s):
             return
-        has_turn = any(turn.node == self._own_id for turn in found.turns)
-        follows, is_new = self._leads.take(src, frame, grant.reach, at, has_turn=has_turn)
+        follows, is_new = self._leads.take(src, frame, grant.reach, at, found, is_weak=is_weak)
         if is_new:
             self._begin_anew()
         last = self._rounds.last
