@@ -3,7 +3,9 @@
 from random import Random
 
 from sdrlinkd.link import Overrides
-from tests.link.test_routes import flows, mesh
+from sdrlinkd.link.routes import Routes
+from sdrlinkd.wire import BROADCAST, DST, HOP, SEQ, SRC, Lsa
+from tests.link.test_routes import AUTO, flows, mesh
 
 PERIOD_S = 0.02
 
@@ -55,3 +57,22 @@ def test_no_detour_over_links_that_lose_nearly_all():
     is_deaf = False
     air.run(air.now + 1.0)
     assert sorted(air.numbers(3)) == list(range(80))
+
+
+def test_pdus_that_were_sent_out_of_order_are_given_up_together():
+    """Otherwise a relay goes around the same robot anew every time that it looks."""
+    routes = Routes(AUTO, 2, 6, 200, lambda: 0)
+    routes.placed(3, BROADCAST, 1, 0.9, 20.0, is_direct=True, has_messages=False)
+    routes.hear(3, Lsa(3, 1, ((2, 0),)), 0.9)
+    routes.look(0.95)
+    for number in (9, 13, 14, 15, 10):
+        pdu = bytearray(64)
+        pdu[SRC], pdu[DST], pdu[SEQ], pdu[HOP] = 1, 3, number, 5 << 4
+        routes.sent(bytes(pdu), number, 1.0)
+    for i in range(115):
+        # Robot 3 is still heard.
+        routes.placed(3, BROADCAST, i + 2, 1 + i / 20, 20.0, is_direct=True, has_messages=False)
+        routes.look(1 + i / 20)
+        if i == 20:
+            assert routes.report(2.0).going_around == [3]
+    assert routes.report(6.7).going_around == []

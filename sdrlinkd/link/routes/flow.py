@@ -147,7 +147,7 @@ class Flow:
     def forgive(self, hop: int) -> None:
         """Expect no answer any more to what a robot was sent so far."""
         if self._sent:
-            up_to = self._sent[-1].number + 1
+            up_to = max(each.number for each in self._sent) + 1
             self._answered[hop] = max(up_to, self._answered.get(hop, -1))
 
     def wait_s(self, hop: int) -> float:
