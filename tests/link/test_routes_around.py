@@ -2,6 +2,8 @@
 
 from random import Random
 
+import pytest
+
 from sdrlinkd.link import Overrides
 from sdrlinkd.link.routes import Routes
 from sdrlinkd.wire import BROADCAST, DST, HOP, SEQ, SRC, Lsa
@@ -76,3 +78,28 @@ def test_pdus_that_were_sent_out_of_order_are_given_up_together():
         if i == 20:
             assert routes.report(2.0).going_around == [3]
     assert routes.report(6.7).going_around == []
+
+
+@pytest.mark.parametrize(
+    ("snr_db", "least", "most"), [(9.0, 1.0, 1.1), (6.0, 1.5, 3.0), (5.0, 20.0, 100.0)]
+)
+def test_a_link_that_is_about_to_fail_costs_more_before_pdus_are_lost(snr_db, least, most):
+    """A robot that drives out of range is not heard from one second to the next."""
+    routes = Routes(AUTO, 2, 6, 200, lambda: 0)
+    routes.set_needed_snr(6.6)
+    routes.hear(3, Lsa(3, 1, ((2, 0),)), 0.0)
+    for i in range(100):
+        routes.placed(3, BROADCAST, i, i / 50, snr_db, is_direct=True, has_messages=False)
+        routes.look(i / 50)
+    assert least <= routes.take_links()[2][3] <= most
+
+
+def test_a_good_link_behind_one_that_carries_nothing_is_no_problem():
+    """Costs are sums, and 1 added to a very large number changes nothing."""
+    routes = Routes(AUTO, 2, 6, 200, lambda: 0)
+    routes.placed(3, BROADCAST, 1, 0.9, 20.0, is_direct=True, has_messages=False)
+    for lsa in (Lsa(3, 1, ((2, 0), (4, 254))), Lsa(4, 1, ((3, 254), (5, 0))), Lsa(5, 1, ((4, 0),))):
+        routes.hear(3, lsa, 0.9)
+    routes.look(0.95)
+    (flow,) = routes.report(1.0).flows
+    assert flow.forwarded_by == [3]
