@@ -287,8 +287,8 @@ class Link:
         """Settle a burst by the outcome that the radio reports."""
         self._scheduler.confirm(burst, outcome, now)
         if outcome is Outcome.SENT and self._routes.is_auto:
-            for octets, number in burst.numbered():
-                self._routes.sent(octets, number, now)
+            for octets, number, is_bare in burst.numbered():
+                self._routes.sent(octets, number, now, is_bare=is_bare)
             self._tell_routes(now)
         self._tell_dropped()
 
@@ -616,8 +616,10 @@ class Link:
                 self._forward_after_all(waiting)
 
     def _forward(self, event: PduToRelay) -> None:
-        pdu, data, at, until, is_ours_too, number, _ = event
-        refused = self._intake.forward(pdu, data, at, until, number, self._scheduler.bytes_per_s)
+        pdu, data, at, until, is_ours_too, number, _, is_bare = event
+        refused = self._intake.forward(
+            pdu, data, at, until, number, self._scheduler.bytes_per_s, is_bare=is_bare
+        )
         if refused and not is_ours_too:
             self._reception.relay_refused()
         if not refused:
@@ -635,7 +637,7 @@ class Link:
         snr_db = None if neighbor is None else neighbor.mean_snr_db
         self._routes.placed(
             src, read.pdu.dst, event.number, event.at, snr_db, is_direct=not read.is_relayed,
-            has_messages=read.control.n_entries < len(read.pdu.entries),
+            has_messages=read.has_messages,
         )  # fmt: skip
 
     def _send_again(self, again: Again, now: float) -> None:

@@ -11,13 +11,15 @@ LOSSY = 2.0
 """Exponent of the expected number of tries, until a PDU and its answer arrive, in the cost of a
 link: two hops that lose nothing are better than one that loses a sixth each way, as repeats take
 time, and may be lost, too."""
+MOST_COST = 1e6
+"""What a link costs at most. Beside much larger numbers, a link that costs 1 would cost nothing."""
 NEAR = 1.1
 """How much longer than the best path one may be that takes fewer relays."""
 
 
 def cost_of(share: float, share_back: float) -> float:
     """What a link costs over which these shares of PDUs arrive, one way and back."""
-    return float((share * share_back) ** -LOSSY)
+    return float(min((share * share_back) ** -LOSSY, MOST_COST))
 
 
 def pdus_sent(cost: float) -> float:

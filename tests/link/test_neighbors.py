@@ -1,6 +1,9 @@
-"""How long a robot's usual pauses are, and what is an outage."""
+"""How long a robot's usual pauses are, what is an outage, and of whom robots report."""
 
+from sdrlinkd.link import Overrides
 from sdrlinkd.link.receive import LONGEST_GAP_S, Neighbor
+from sdrlinkd.wire import LinkReport
+from tests.link.test_routes import mesh
 
 
 def heard(neighbor, times):
@@ -22,3 +25,17 @@ def test_an_outage_is_no_usual_pause():
     heard(neighbor, [float(second) for second in range(1, 60)])
     assert heard(neighbor, [400.0]) == LONGEST_GAP_S
     assert heard(neighbor, [400.0 + second for second in range(1, 120)]) < 3.0
+
+
+def test_a_robot_that_is_heard_through_relays_only_is_not_reported():
+    """Who plans the air takes it for a link, and would send plans over it."""
+    air = mesh((1, 2), (2, 3), (1, 3))
+    air.run(3.0)
+    air.hears -= {(1, 3), (3, 1)}
+    air.run(5.0)
+    left_at = air.now
+    air.flow(3, 200, every_s=0.02, overrides=Overrides(dst=1))
+    reports = [(at, each) for at, each in air.records(1) if isinstance(each, LinkReport)]
+    assert any(each.node == 3 and at < 3 for at, each in reports)
+    assert {each.node for at, each in reports if at > left_at} == {2}
+    assert len(set(air.numbers(1))) == 200

@@ -11,6 +11,7 @@ from tests.link.radios import params
 PDU_S, LONGEST_S, STEP_S = 5e-4, 4e-3, 2e-4
 ROOM = 60
 BEACON_S = 1.0
+LUCK = 0.03
 TRAITS = PduLinkTraits(
     kind="ether", is_lockstep=True, senses=True, shares_air=True, turnaround_s=1e-4, lead_s=1e-4,
     react_s=STEP_S, detect_s=2.5e-5, gap_s=6e-6, pdu_burst_s=(PDU_S,), longest_burst_s=(LONGEST_S,),
@@ -54,9 +55,14 @@ class Robot:
 
 
 class Team:
-    """Robots `nodes`; `links`: pairs that hear each other, None: all; `loss`: of each burst."""
+    """Robots `nodes`; `links`: pairs that hear each other, None: all; `loss`: of each burst.
 
-    def __init__(self, nodes, seed, links=None, loss=0.0, joins=None, traits=TRAITS):
+    The pairs in `weak` notice each other's signals, and read the share `luck` of their bursts.
+    """
+
+    def __init__(
+        self, nodes, seed, links=None, loss=0.0, joins=None, traits=TRAITS, weak=(), luck=LUCK
+    ):  # fmt: skip
         self.rng = Random(seed)
         self.robots = {
             node: Robot(
@@ -64,7 +70,8 @@ class Team:
             )
             for node in nodes
         }
-        self.links, self._loss = links, loss
+        self.links, self._loss, self._weak = links, loss, weak
+        self._luck = luck
         self.traits = traits
         self.bursts = []
         self.waits_s = []
@@ -146,16 +153,19 @@ class Team:
         burst = Burst(begin, begin + length_s, robot.id, len(records))
         self.bursts.append(burst)
         for other in self.robots.values():
-            if other is robot or not self.hears(robot.id, other.id) or begin < other.joins_at:
+            pair = robot.id, other.id
+            is_weak = pair in self._weak or pair[::-1] in self._weak
+            is_heard = is_weak or self.hears(*pair)
+            if other is robot or not is_heard or begin < other.joins_at:
                 continue
             other.heard_end = max(other.heard_end, other.clock(burst.end))
-            if self.rng.random() >= self._loss:
-                self._hear(other, robot, records, other.clock(begin))
+            if self.rng.random() >= (1 - self._luck if is_weak else self._loss):
+                self._hear(other, robot, records, other.clock(begin), is_weak=is_weak)
 
-    def _hear(self, robot, src, records, at):
+    def _hear(self, robot, src, records, at, *, is_weak):
         """What a robot takes from a burst; here it does so at once, which is soon enough."""
         access = robot.access
-        access.heard(src.id, at, False)
+        access.heard(src.id, at, False, is_weak=is_weak)
         for node in self.robots:
             # As the reports in beacons do.
             if self.hears(src.id, node) and node != src.id and self.robots[node].is_on:
@@ -165,7 +175,7 @@ class Team:
             if name == "Frame":
                 access.take_frame(src.id, record, at)
             elif name == "Grant":
-                access.take_grant(src.id, record, at)
+                access.take_grant(src.id, record, at, is_weak=is_weak)
             else:
                 access.take_want(src.id, record, at)
 

@@ -176,7 +176,14 @@ class Auction(BusyChannel):
             self._asked, silent_since = self._before
             self._wants.take_back(self._own_id, silent_since)
 
-    def heard(self, src: int, at: float, is_relayed: bool) -> None:
+    def heard(
+        self,
+        src: int,
+        at: float,
+        is_relayed: bool,
+        *,
+        is_weak: bool = False,  # noqa: ARG002  # weak ones count, too
+    ) -> None:
         """Remember who was on the air."""
         if not is_relayed and self._wants.on_air(src, at):
             self._mute.add(src, at)

@@ -141,10 +141,13 @@ class Access(Protocol):
     def not_sent(self, start: float) -> None:
         """Note that the burst planned for `start` did not leave."""
 
-    def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """Note a PDU of robot `src`, in a burst whose preamble was at `at`, possibly relayed."""
+    def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
+        """Note a PDU of robot `src`, in a burst whose preamble was at `at`, possibly relayed.
 
-    def told_of(self, node: int, at: float, by: int) -> None:
+        `is_weak`: the signal is weaker than PDUs need, so this one came by luck.
+        """
+
+    def told_of(self, node: int, at: float, by: int, *, is_weak: bool = False) -> None:
         """Note that robot `by` reported at `at` that it hears robot `node`."""
 
     def beacon(self, src: int, at: float) -> None:
@@ -153,7 +156,7 @@ class Access(Protocol):
     def take_want(self, src: int, want: Want, at: float) -> None:
         """Take what a robot wants next, as robot `src` told it in a burst at `at`."""
 
-    def take_grant(self, src: int, grant: Grant, at: float) -> None:
+    def take_grant(self, src: int, grant: Grant, at: float, *, is_weak: bool = False) -> None:
         """Take the turns that robot `src` told, after a FRAME, in a burst at `at`."""
 
     def know_links(self, edges: Edges) -> None:
@@ -214,10 +217,10 @@ class BusyChannel:
         if not self._own_ends:
             self._own_ends = [NEVER]
 
-    def heard(self, src: int, at: float, is_relayed: bool) -> None:
+    def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
         """Ignore the source of a burst, as no turn depends on it."""
 
-    def told_of(self, node: int, at: float, by: int) -> None:
+    def told_of(self, node: int, at: float, by: int, *, is_weak: bool = False) -> None:
         """Ignore which robots others hear, as no turn depends on it."""
 
     def beacon(self, src: int, at: float) -> None:
@@ -227,7 +230,7 @@ class BusyChannel:
         """Remember that robot `src` tells what it wants and so uses another policy."""
         self._bidding.add(src, at)
 
-    def take_grant(self, src: int, grant: Grant, at: float) -> None:
+    def take_grant(self, src: int, grant: Grant, at: float, *, is_weak: bool = False) -> None:
         """Ignore turns; the FRAME before them tells that the other policy is another one."""
 
     def know_links(self, edges: Edges) -> None:

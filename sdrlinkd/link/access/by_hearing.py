@@ -156,17 +156,18 @@ class ByHearing:
             self._grants.end()
             self._in_use, self._begins_at = self._auction, start
 
-    def heard(self, src: int, at: float, is_relayed: bool) -> None:
+    def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
         """Note who is heard."""
         self._auction.heard(src, at, is_relayed)
-        self._grants.heard(src, at, is_relayed)
-        if not is_relayed:
+        self._grants.heard(src, at, is_relayed, is_weak=is_weak)
+        if not (is_relayed or is_weak):
             self._hearing.heard(src, at)
 
-    def told_of(self, node: int, at: float, by: int) -> None:
+    def told_of(self, node: int, at: float, by: int, *, is_weak: bool = False) -> None:
         """Note that robot `by` hears robot `node`."""
-        self._grants.told_of(node, at, by)
-        self._hearing.heard(node, at)
+        self._grants.told_of(node, at, by, is_weak=is_weak)
+        if not is_weak:
+            self._hearing.heard(node, at)
 
     def know_links(self, edges: Edges) -> None:
         """Take the links of the team, as its LSAs tell them."""
@@ -190,9 +191,9 @@ class ByHearing:
         """Take the FRAME that comes with a plan."""
         self._grants.take_frame(src, frame, at)
 
-    def take_grant(self, src: int, grant: Grant, at: float) -> None:
+    def take_grant(self, src: int, grant: Grant, at: float, *, is_weak: bool = False) -> None:
         """Follow a plan; after the last one, the auction goes on."""
-        self._grants.take_grant(src, grant, at)
+        self._grants.take_grant(src, grant, at, is_weak=is_weak)
         if self._grants.has_ended:
             self._go_back(at)
         elif self._in_use is self._auction and self._grants.leads.follows:

@@ -74,16 +74,9 @@ class Grants(BusyChannel):
     @property
     def state(self) -> str:
         """Policy, times, and whose plans are kept, for people."""
-        leads = self.leads
-        doing = "listening for a plan"
-        if leads.is_root:
-            doing = "planned here"
-        elif leads.follows:
-            doing = f"planned by robot {leads.root}"
-            if leads.level > 1:
-                doing += f", {leads.level} hops away"
-            if self.lacks:
-                doing += f", without {self.lacks}"
+        doing = self.leads.doing
+        if self.leads.follows and self.lacks:
+            doing += f", without {self.lacks}"
         return (
             f"grant: {len(self._team.nodes)} robots, rounds of at most {1e3 * self.round_s:.3g} "
             f"ms, guard {1e3 * self._times.ticks.guard_s:.3g} ms; {doing}"
@@ -215,19 +208,19 @@ class Grants(BusyChannel):
         if self._planner.not_sent(start):
             self._rounds.forget()
 
-    def heard(self, src: int, at: float, is_relayed: bool) -> None:
+    def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
         """Note that we hear robot `src` directly."""
         self._asked_at = max(self._asked_at, at)
         if is_relayed:
             return
-        self._team.heard(src, at)
+        self._team.told_of(src, at, self._own_id, is_weak=is_weak)
         has_turn = self._rounds.has_turn(src, at, self._times.ticks.guard_s)
-        if has_turn is not None and src != self.leads.root:
+        if has_turn is not None and src != self.leads.root and not is_weak:
             self._strays.heard(src, at, has_turn=has_turn)
 
-    def told_of(self, node: int, at: float, by: int) -> None:
+    def told_of(self, node: int, at: float, by: int, *, is_weak: bool = False) -> None:
         """Note that robot `by` hears robot `node`."""
-        self._team.told_of(node, at, by)
+        self._team.told_of(node, at, by, is_weak=is_weak)
 
     def know_links(self, edges: Edges) -> None:
         """Take the links of the team, as its LSAs tell them."""
@@ -247,7 +240,7 @@ class Grants(BusyChannel):
         elif self._team.places(self.leads.root).is_behind(want.node, self._own_id):
             self._behind[want.node] = want
 
-    def take_grant(self, src: int, grant: GrantRecord, at: float) -> None:
+    def take_grant(self, src: int, grant: GrantRecord, at: float, *, is_weak: bool = False) -> None:
         """Follow a plan of the best root known, as robot `src` told it."""
         frame = self._frames.of(src, at)
         if frame is None:
@@ -256,8 +249,7 @@ class Grants(BusyChannel):
         found = self._times.ticks.round(grant.number, since + 1e-6 * grant.begins_us, grant.turns)
         if not found.is_sound(at, 2 * self.round_s):
             return
-        has_turn = any(turn.node == self._own_id for turn in found.turns)
-        follows, is_new = self.leads.take(src, frame, grant.reach, at, has_turn=has_turn)
+        follows, is_new = self.leads.take(src, frame, grant.reach, at, found, is_weak=is_weak)
         if is_new:
             self._begin_anew()
         self.has_ended = follows and grant.turns == LAST_PLAN

@@ -3,7 +3,8 @@
 The best root is the robot from which a PDU reaches all others with the fewest tries, of these the
 lowest. Everybody follows the best root it has heard of. A robot that reaches all with fewer takes
 over in its own turn. A root that is silent for some rounds is lost. Then the others wait, each a
-turn longer than the one before it, until one of them plans.
+turn longer than the one before it, until one of them plans. They await silence for that, but not
+for long: robots that nobody here can read may be heard all the time.
 """
 
 from math import inf
@@ -11,6 +12,7 @@ from math import inf
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma_states import GRANT_STEPS, Happens, State
 from sdrlinkd.link.access.team import PRESENT_S, Team
+from sdrlinkd.link.access.turns import Round
 from sdrlinkd.link.traits import Sensed
 from sdrlinkd.wire import FAR, Frame
 
@@ -20,6 +22,11 @@ BETTER_S = 1.0
 """Time in s for which a robot must have been a better root before it takes over."""
 LOST_ROUNDS = 2.2
 """Rounds without a plan, for each hop to the root, after which the root is lost."""
+STEADY_S, PASSED_ON_S = 0.5, 0.3
+"""Time in s for which plans have come over a weak link without a gap, so that they count; and the
+longest gap in s of plans that are passed on, as not all of them are."""
+PATIENCE_S = 0.3
+"""Time in s after the loss of a root for which a silent round is awaited, beside that round."""
 MAX_LEVEL = 255
 
 
@@ -48,11 +55,23 @@ class Leadership:
         listen_s = max(LISTEN_S, 3 * round_s) + place * (LISTEN_S / 4 + round_s)
         self._begins_at = listen_s if place else 2 * round_s
         self._told_at = -inf
-        """When a plan of our root came last."""
+        """When a plan of our root came last that counts."""
+        self._runs: dict[int, tuple[float, float]] = {}
+        """By root, since when its plans have come without a gap, and the last one of them."""
         self._has_turn = False
         """Whether the last plan had a turn of ours."""
         self._better_since = inf
         """Since when we would be a better root."""
+
+    @property
+    def doing(self) -> str:
+        """Who plans, for people."""
+        if self.is_root:
+            return "planned here"
+        if not self.follows:
+            return "listening for a plan"
+        away = f", {self.level} hops away" if self.level > 1 else ""
+        return f"planned by robot {self.root}{away}"
 
     @property
     def is_root(self) -> bool:
@@ -79,7 +98,10 @@ class Leadership:
         if not self.follows:
             return False
         before = sum(node < self._own_id and node != self.root for node in self._team.present(now))
-        if not self.is_lost(now - before * self._turn_s) or not self._is_silent(now, sensed):
+        since = now - before * self._turn_s
+        if not self.is_lost(since):
+            return False
+        if not (self._is_silent(now, sensed) or self.is_lost(since - self._round_s - PATIENCE_S)):
             return False
         self._lost = self.root, self.level, now + 2 * PRESENT_S
         self.begin(now, Happens.LOSES)
@@ -118,11 +140,13 @@ class Leadership:
         self.rank = self._own_rank(now)
 
     def take(
-        self, src: int, frame: Frame, reach: int, at: float, *, has_turn: bool
+        self, src: int, frame: Frame, reach: int, at: float, found: Round, *, is_weak: bool
     ) -> tuple[bool, bool]:
-        """Take a plan that robot `src` tells: (whether we follow it, whether its root is new).
+        """Take the plan of a round that robot `src` tells: (whether we follow it, whether its root
+        is new).
 
-        `has_turn`: we have a turn in it.
+        `is_weak`: the signal was weaker than PDUs need. Then the plan came by luck, and would
+        silence us until the next one does. It only counts where plans come all the time.
         """
         root, level = frame.root, frame.level + 1
         if root == self._own_id or level > MAX_LEVEL:
@@ -131,22 +155,42 @@ class Leadership:
             # This robot has not noticed yet that the root is lost.
             return False, False
         rank = reach, root
+        counts = self._is_steady(src, root, at) or not is_weak
         is_new = not (self.follows and root == self.root)
         if not is_new:
             if level < self.level or src == self._parent:
                 self.level, self._parent = level, src
-        elif self.role is State.LISTENING or rank < self.rank or self.is_lost(at):
+        elif counts and (
+            # Who told us the plans of our root follows another one now, and tells no more of those.
+            src == self._parent
+            or self.role is State.LISTENING
+            or rank < self.rank
+            or self.is_lost(at)
+        ):
             self.role = after(GRANT_STEPS, self.role, Happens.FOLLOWS)
             self.root, self.level, self._parent = root, level, src
         else:
             return False, False
-        self.rank, self._has_turn = rank, has_turn
-        self._told_at = max(at, self._told_at)
+        self.rank = rank
+        self._has_turn = any(turn.node == self._own_id for turn in found.turns)
+        if counts:
+            self._told_at = max(at, self._told_at)
         if self._own_rank(at)[0] >= reach:
             self._better_since = inf
         elif self._better_since == inf:
             self._better_since = at
         return True, is_new
+
+    def _is_steady(self, src: int, root: int, at: float) -> bool:
+        """Whether plans of a root, one of which robot `src` tells, have come all the time."""
+        gap_s = LOST_ROUNDS * self._round_s
+        if src != root:
+            gap_s = max(gap_s, PASSED_ON_S)
+        since, last = self._runs.get(root, (at, at))
+        if at > last + gap_s:
+            since = at
+        self._runs[root] = since, max(at, last)
+        return at >= since + STEADY_S
 
     def _own_rank(self, now: float) -> tuple[int, int]:
         return self._team.reach(self._own_id, self._team.present(now)), self._own_id

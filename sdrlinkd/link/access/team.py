@@ -58,15 +58,13 @@ class Team:
         self._near_since = inf
         """Since when the same robots hear each other, and who does."""
 
-    def heard(self, node: int, at: float) -> None:
-        """Note that we hear a robot directly."""
-        if node in self.nodes and node != self._own_id:
-            self._seen_at[node] = at
-            self._link(self._own_id, node, at)
+    def told_of(self, node: int, at: float, by: int, *, is_weak: bool = False) -> None:
+        """Note that robot `by`, we or another one, hears robot `node`.
 
-    def told_of(self, node: int, at: float, by: int) -> None:
-        """Note that robot `by` hears robot `node`."""
-        if {node, by} <= set(self.nodes) and node != by:
+        If the signal is weaker than PDUs need, that counts only as long as LSAs do not tell.
+        """
+        is_known = {node, by} <= self._lsa_edges.keys()
+        if {node, by} <= set(self.nodes) and node != by and not (is_weak and is_known):
             self.seen(node, at)
             self._link(by, node, at)
 
@@ -81,12 +79,13 @@ class Team:
         self._changed()
 
     def present(self, now: float) -> list[int]:
-        """The other robots that are here, in ascending order: heard, told of, or in LSAs."""
-        since, linked, own = now - PRESENT_S, self._lsa_edges, self._own_id
+        """The other robots that are here, in ascending order: heard, told of, or reached."""
+        since, own = now - PRESENT_S, self._own_id
+        reached = self.places(own).costs if self._lsa_edges else {}
         return [
             node
             for node in self.nodes
-            if node != own and (self._seen_at.get(node, -inf) > since or linked.get(node))
+            if node != own and (self._seen_at.get(node, -inf) > since or node in reached)
         ]
 
     def places(self, root: int) -> Places:

@@ -114,11 +114,12 @@ class Intake:
 
     def forward(
         self, pdu: Pdu, data: bytes, at: float, until: float, number: int | None,
-        bytes_per_s: float,
+        bytes_per_s: float, *, is_bare: bool = False,
     ) -> str | None:  # fmt: skip
         """Queue another robot's PDU, which arrived at `at` and is worthless after `until`.
 
         `number` is its PDU number, None if unknown. It gets the highest priority of its topics.
+        `is_bare`: it holds only control records.
         Returns None, or the ledger's reason for refusing it.
         """
         tally = self._relayed
@@ -126,7 +127,7 @@ class Intake:
         priority = max((self._priority(each.topic_id) for each in pdu.entries), default=0)
         message = Outgoing(
             RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally,
-            is_whole=True, pdu_number=number,
+            is_whole=True, pdu_number=number, is_bare=is_bare,
         )  # fmt: skip
         return self._outbox.put(message, DEFAULT_POLICY, bytes_per_s)
 

@@ -20,10 +20,10 @@ class Outgoing:
 
     __slots__ = (
         "_parting", "arrived_at", "body", "channel", "dst", "entry_id", "expires_at", "fate",
-        "held_ids", "ids", "is_compressed", "is_expected", "is_whole", "k", "key", "lane",
-        "last_at", "n_repeats", "next_index", "overhead", "parity", "parts_left", "payload",
-        "pdu_number", "priority", "qos", "receipt", "rests_id", "stamped", "tally", "topic_id",
-        "total", "unconfirmed",
+        "held_ids", "ids", "is_bare", "is_compressed", "is_expected", "is_whole", "k", "key",
+        "lane", "last_at", "n_repeats", "next_index", "overhead", "parity", "parts_left",
+        "payload", "pdu_number", "priority", "qos", "receipt", "rests_id", "stamped", "tally",
+        "topic_id", "total", "unconfirmed",
     )  # fmt: skip
 
     def __init__(
@@ -45,13 +45,15 @@ class Outgoing:
         is_compressed: bool = False,
         is_whole: bool = False,
         pdu_number: int | None = None,
+        is_bare: bool = False,
     ) -> None:
         """Make a queued message.
 
         `receipt` is the producer's id for the receipt, empty if none is wanted, and `key` its
         producer key. `number` is the topic's number on the air if that is not `topic_id`. `parting`
         says how to divide a large message, whose parts are cut one after the other. `is_whole`
-        means that the payload is another robot's PDU to be relayed, with `pdu_number` if known.
+        means that the payload is another robot's PDU to be relayed, with `pdu_number` if known;
+        `is_bare`, that this PDU holds only control records.
         """
         self.topic_id = topic_id
         self.payload = payload
@@ -68,6 +70,7 @@ class Outgoing:
         self.is_compressed = is_compressed
         self.is_whole = is_whole
         self.pdu_number = pdu_number
+        self.is_bare = is_bare
         self.channel = topic_id if number is None else number
         """The topic id of its entries on the air; PARTS for a large message."""
         self.body = payload

@@ -14,13 +14,15 @@ if TYPE_CHECKING:
 class PduHeard(NamedTuple):
     """A valid PDU from another robot, for any destination; its burst's preamble came at `at`.
 
-    `is_relayed`: a robot other than its source has sent it.
+    `is_relayed`: a robot other than its source has sent it. `snr_db` is that of its signal, None if
+    unknown.
     """
 
     pdu: Pdu
     stamps: list[Stamp]
     at: float
     is_relayed: bool
+    snr_db: float | None
 
 
 class RecordHeard(NamedTuple):

@@ -110,7 +110,7 @@ class Inbox:
             self._routes.forwarded(admitted.raw, at)
         stamps = read.stamps
         if not admitted.was_seen and (pdu.src != self._own_id or is_relayed):
-            events.append(PduHeard(pdu, stamps, at, is_relayed))
+            events.append(PduHeard(pdu, stamps, at, is_relayed, admitted.snr_db))
         if pdu.src == self._own_id and not self._hears_self:
             self._own_pdus.heard(admitted.raw, at)
             return self._drop("rx_own", events)

@@ -32,6 +32,8 @@ class Neighbor:
     hops_left: int = 0
     snr_db: float | None = None
     mean_snr_db: float | None = None
+    is_direct: bool = False
+    """Whether a PDU has come directly since the last report."""
     boot_id: int | None = None
     _strange_boot_id: int | None = None
     reboots: int = 0
@@ -57,7 +59,8 @@ class Neighbor:
         self.duplicates += 1
 
     def note_snr(self, snr_db: float | None) -> None:
-        """Note the SNR of one more PDU, in dB."""
+        """Note the SNR of one more PDU that came directly, in dB."""
+        self.is_direct = True
         self.snr_db = snr_db
         if snr_db is None or self.mean_snr_db is None:
             self.mean_snr_db = snr_db
@@ -65,7 +68,7 @@ class Neighbor:
             self.mean_snr_db += SNR_WEIGHT * (snr_db - self.mean_snr_db)
 
     def take_quality(self) -> tuple[float, float] | None:
-        """(mean SNR in dB, share of PDUs lost since the last call); None if nothing was heard.
+        """(mean SNR in dB, share of PDUs lost since the last call); None if nothing came directly.
 
         What was repeated counts as lost, too.
         """
@@ -73,7 +76,8 @@ class Neighbor:
         first_heard = self.heard - self.repaired
         heard = first_heard - self._reported[0]
         lost = max(0, missed - self._reported[1])
-        if heard <= 0 or self.mean_snr_db is None:
+        is_direct, self.is_direct = self.is_direct, False
+        if heard <= 0 or not is_direct or self.mean_snr_db is None:
             return None
         self._reported = (first_heard, missed)
         return self.mean_snr_db, lost / (heard + lost)

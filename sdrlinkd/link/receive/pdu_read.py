@@ -47,11 +47,14 @@ class PduRead(NamedTuple):
     is_forwarded: bool
 
     @property
+    def has_messages(self) -> bool:
+        """Whether it holds more than control records."""
+        return self.control.n_entries < len(self.pdu.entries)
+
+    @property
     def is_far(self) -> bool:
         """Whether there is something in it for robots that hear relays only."""
-        return self.control.n_entries < len(self.pdu.entries) or any(
-            isinstance(record, _FAR) for record in self.records
-        )
+        return self.has_messages or any(isinstance(record, _FAR) for record in self.records)
 
     @property
     def stamps(self) -> list[Stamp]:
@@ -111,7 +114,7 @@ class PduReader:
             pdu, _, records, is_relayed, _ = self.read(admitted)
         except PduError:
             return []
-        events: list[Event] = [PduHeard(pdu, [], admitted.at, is_relayed)]
+        events: list[Event] = [PduHeard(pdu, [], admitted.at, is_relayed, admitted.snr_db)]
         if not is_relayed:
             events += [
                 RecordHeard(pdu.src, record, admitted.at)

@@ -39,8 +39,9 @@ class Relaying:
         until = min(at + routes.lifespan_s, self._fresh_until(pdu))
         number = track.number % PDU_NUMBERS if track.is_numbered else None
         return PduToRelay(
-            pdu, admitted.raw, first_at, until, is_ours, number, is_spare=not is_wanted
-        )
+            pdu, admitted.raw, first_at, until, is_ours, number,
+            is_spare=not is_wanted, is_bare=not read.has_messages,
+        )  # fmt: skip
 
     def _fresh_until(self, pdu: Pdu) -> float:
         """Time at which all messages in `pdu` will be too old; infinity if unknown."""

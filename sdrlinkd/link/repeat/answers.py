@@ -88,7 +88,7 @@ class Answers:
         for number, octets, inner, messages, qos in zip(
             numbers, pdus, plain or pdus, carried, classes, strict=True
         ):
-            if not messages:
+            if not messages or messages[0].is_bare:
                 continue
             is_relayed = messages[0].is_whole
             told = messages[0].pdu_number if is_relayed else number % PDU_NUMBERS

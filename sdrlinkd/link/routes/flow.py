@@ -43,6 +43,8 @@ class Flow:
         self.robots: frozenset[int] = frozenset()
         """Who forwards next."""
         self.hops: frozenset[int] = frozenset()
+        self.tellers: frozenset[int] = frozenset()
+        """Who names us to forward it."""
         self.sent_at = -inf
         self.told_at = -inf
         """When ROUTE was made last."""
@@ -66,11 +68,11 @@ class Flow:
         self._wait_s: dict[int, tuple[float, float]] = {}
         """(mean, mean deviation) of the time of an answer, by robot."""
 
-    def sent(self, number: int, hops_left: int, at: float) -> None:
-        """Note that a PDU has left; again, if it was repeated."""
+    def sent(self, number: int, hops_left: int, at: float, *, is_bare: bool = False) -> None:
+        """Note that a PDU has left; again, if it was repeated. Nobody answers for a bare one."""
         self.sent_at, self.hops_left = at, hops_left
         number = self._newest = heard_number(self._newest, number)
-        if not self.hops:
+        if not self.hops or is_bare:
             return
         for i, known in enumerate(self._sent):
             if known.number == number:
@@ -145,7 +147,7 @@ class Flow:
     def forgive(self, hop: int) -> None:
         """Expect no answer any more to what a robot was sent so far."""
         if self._sent:
-            up_to = self._sent[-1].number + 1
+            up_to = max(each.number for each in self._sent) + 1
             self._answered[hop] = max(up_to, self._answered.get(hop, -1))
 
     def wait_s(self, hop: int) -> float:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from sdrlinkd.link.paths import Edges, distances, path, tree
 from sdrlinkd.link.routes.flow import UNANSWERED, Flow
 from sdrlinkd.link.routes.links import Links
-from sdrlinkd.link.routes.named import Ends
+from sdrlinkd.link.routes.named import Ends, Named
 from sdrlinkd.reports import FlowReport
 from sdrlinkd.wire import BROADCAST, PDU_NUMBERS, Need, Route
 
@@ -16,6 +16,10 @@ AROUND_S, LEAST_AROUND_S = 5.0, 1.0
 """Time in s for which a robot that did not answer is gone around; the least if it does answer."""
 STAYS = 0.8
 """A path is left for one that costs less than this part of it."""
+AVOIDED = 100.0
+"""How many times more a link costs to a robot that did not answer, or that has the PDUs already: as
+if a third of them arrived each way. So a path of good links goes around it, and none of bad ones.
+"""
 
 
 class Again(NamedTuple):
@@ -29,9 +33,10 @@ class Again(NamedTuple):
 class Forwarding:
     """Names those who forward next, flow by flow, and changes them if they do not answer."""
 
-    def __init__(self, own_id: int, links: Links) -> None:
+    def __init__(self, own_id: int, links: Links, named: Named) -> None:
         self._own_id = own_id
         self._links = links
+        self._named = named
         self._flows: dict[Ends, Flow] = {}
         self._version = -1
         self.around: dict[int, float] = {}
@@ -40,13 +45,18 @@ class Forwarding:
         """Whether `take_news` would return something."""
         self.begin_anew()
 
-    def sent(self, src: int, dst: int, number: int, hops_left: int, at: float) -> None:
-        """Note that a PDU with messages has left at `at`; again, if it was repeated."""
+    def sent(
+        self, src: int, dst: int, number: int, hops_left: int, at: float, *, is_bare: bool = False
+    ) -> None:
+        """Note that a PDU has left at `at`; again, if it was repeated.
+
+        `is_bare`: it holds only control records, and nobody answers for it.
+        """
         flow = self._flows.get((src, dst))
         is_new = flow is None
         if flow is None:
             flow = self._flows[src, dst] = Flow(src, dst)
-        flow.sent(number, hops_left, at)
+        flow.sent(number, hops_left, at, is_bare=is_bare)
         if is_new:
             self._reroute(flow, at)
 
@@ -72,9 +82,9 @@ class Forwarding:
             del self.around[hop]
             self._version = -1
         again = list(self._unanswered(now))
-        if self._version != self._links.version:
-            self._version = self._links.version
-            for flow in self._flows.values():
+        is_new, self._version = self._version != self._links.version, self._links.version
+        for ends, flow in self._flows.items():
+            if is_new or flow.tellers != self._named.tellers(ends):
                 self._reroute(flow, now)
         for ends, flow in list(self._flows.items()):
             if not flow.is_active(now) and ends != (self._own_id, BROADCAST):
@@ -114,23 +124,30 @@ class Forwarding:
             if flow.is_active(now) or flow.robots
         ]
 
-    def _edges(self, dst: int) -> Edges:
-        """The links of the team, without ours to robots that do not answer.
+    def _edges(self, flow: Flow) -> Edges:
+        """The links of the team as a flow sees them: those to be avoided cost more.
 
-        If `dst`, or some robot where that is everyone, cannot be reached without these, all links.
+        The source never gets its PDUs back. Robots that name us for them have them already.
         """
-        edges, own = self._links.edges, self._own_id
-        if not self.around:
+        edges, own, around = self._links.edges, self._own_id, self.around
+        is_relayed = flow.dst != BROADCAST and flow.src != own
+        if not (around or is_relayed):
             return edges
-        left = {node: cost for node, cost in edges.get(own, {}).items() if node not in self.around}
-        fewer = {**edges, own: left}
-        reached, wanted = (set(distances(each, own)[0]) for each in (fewer, edges))
-        is_enough = reached == wanted if dst == BROADCAST else dst in reached
-        return fewer if is_enough else edges
+        src, had = (flow.src, flow.tellers) if is_relayed else (None, ())
+
+        def seen(one: int, other: int, cost: float) -> float:
+            is_avoided = other in had or (one == own and other in around)
+            return cost * AVOIDED if is_avoided else cost
+
+        return {
+            one: {other: seen(one, other, cost) for other, cost in links.items() if other != src}
+            for one, links in edges.items()
+        }
 
     def _reroute(self, flow: Flow, now: float) -> None:
         """Find out who forwards a flow next."""
-        edges = self._edges(flow.dst)
+        flow.tellers = self._named.tellers((flow.src, flow.dst))
+        edges = self._edges(flow)
         if flow.dst == BROADCAST:
             robots = hops = tree(edges, flow.src).get(self._own_id, frozenset())
         else:
@@ -143,8 +160,6 @@ class Forwarding:
         """The path of a flow from here; the present one stays unless another is clearly better."""
         own, dst = self._own_id, flow.dst
         best = path(edges, own, dst)
-        if flow.src != own and flow.src in best:
-            return []
         for hop in flow.hops - set(best):
             rest = path(edges, hop, dst)
             if hop in edges.get(own, {}) and rest and own not in rest:

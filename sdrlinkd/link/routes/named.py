@@ -56,6 +56,10 @@ class Named:
         known = self._until.get(ends)
         return known is not None and max(known.values(), default=-inf) > now
 
+    def tellers(self, ends: Ends) -> frozenset[int]:
+        """The robots that name this one to forward PDUs of a source to a destination."""
+        return frozenset(self._until.get(ends, ()))
+
     def is_alone(self, ends: Ends) -> bool:
         """Whether nobody else was named beside this robot, so its forwarding is its answer."""
         return self._alone.get(ends, False)

@@ -11,6 +11,9 @@ PRIOR = 2.0
 """How many PDUs the SNR counts for, as long as few have come."""
 DB_PER_HALF = 1.5
 """Change of the SNR in dB that halves, or doubles, the odds that a PDU is lost."""
+HALF_BELOW_DB, CLIFF_DB = 1.0, 0.25
+"""How far below the SNR that is needed half of the PDUs are lost at least, and the change of the
+SNR in dB that doubles the odds of that."""
 MOST_STEP = 64
 """Most PDUs that one silence counts for."""
 FIRST_GAP_S = 1.0
@@ -103,8 +106,11 @@ class Qualities:
         return found
 
     def _loss(self, heard: _Heard) -> int:
-        usual = 1.0
+        usual = most = 1.0
         if heard.snr_db is not None:
-            usual = 1 / (1 + 2 ** ((self._needed_db - heard.snr_db) / DB_PER_HALF))
+            below_db = self._needed_db - heard.snr_db
+            usual = 1 / (1 + 2 ** (below_db / DB_PER_HALF))
+            # Robots that drive out of range fail suddenly; PDUs tell that too late.
+            most = 1 / (1 + 2 ** ((below_db - HALF_BELOW_DB) / CLIFF_DB))
         expected = max(heard.expected, heard.arrived)
-        return loss_of((heard.arrived + PRIOR * usual) / (expected + PRIOR))
+        return loss_of(min(most, (heard.arrived + PRIOR * usual) / (expected + PRIOR)))

@@ -54,7 +54,7 @@ class Routes:
         self.tells_links = self.is_auto
         """Whether this robot tells whom it hears."""
         self._named = Named(own_id)
-        self._forwarding = Forwarding(own_id, self._links)
+        self._forwarding = Forwarding(own_id, self._links, self._named)
         self._taken_version = 0
         self._owed: dict[int, float] = {}
         """Since when answers are owed, by source."""
@@ -138,15 +138,16 @@ class Routes:
 
     # What goes.
 
-    def sent(self, raw: bytes, number: int, at: float) -> None:
-        """Note that a PDU with messages has left at `at`, ours or one that we relay; again, if it
-        was repeated.
+    def sent(self, raw: bytes, number: int, at: float, *, is_bare: bool = False) -> None:
+        """Note that a PDU has left at `at`, ours or one that we relay; again, if it was repeated.
+
+        `is_bare`: it holds only control records.
         """
         if not self.is_auto:
             return
         src, dst = raw[SRC], raw[DST]
-        self._forwarding.sent(src, dst, number, raw[HOP] >> 4, at)
-        if src != self._own_id and self._named.is_alone((src, dst)):
+        self._forwarding.sent(src, dst, number, raw[HOP] >> 4, at, is_bare=is_bare)
+        if not is_bare and src != self._own_id and self._named.is_alone((src, dst)):
             self._owed.pop(src, None)
 
     def look(self, now: float) -> list[Again]:

@@ -10,7 +10,7 @@ class PduToRelay(NamedTuple):
 
     Its ages are those at `at`. `is_ours_too`: the PDU is for this robot as well as for others.
     `number` is its PDU number, None if unknown. `is_spare`: it is relayed only if another robot
-    names this one for it soon.
+    names this one for it soon. `is_bare`: it holds only control records, so nobody answers for it.
     """
 
     pdu: Pdu
@@ -20,3 +20,4 @@ class PduToRelay(NamedTuple):
     is_ours_too: bool
     number: int | None = None
     is_spare: bool = False
+    is_bare: bool = False

@@ -58,16 +58,18 @@ class Burst(NamedTuple):
         """Whether it is a pulse of energy, without PDUs."""
         return not self.pdus
 
-    def numbered(self) -> Iterator[tuple[bytes, int]]:
-        """(octets, PDU number) of each PDU with messages, as far as the number is known."""
+    def numbered(self) -> Iterator[tuple[bytes, int, bool]]:
+        """(octets, PDU number, whether it is bare) of each PDU that has messages or is relayed, as
+        far as the number is known.
+        """
         if self.repeated is not None:
-            yield from ((kept.octets, kept.number) for kept in self.repeated.kept)
+            yield from ((kept.octets, kept.number, False) for kept in self.repeated.kept)
             return
         for octets, messages, own in zip(self.pdus, self.carried, self.numbers, strict=False):
             if messages:
                 number = messages[0].pdu_number if messages[0].is_whole else own
                 if number is not None:
-                    yield octets, number
+                    yield octets, number, messages[0].is_bare
 
     def is_in_vain(self, now: float) -> bool:
         """Whether all messages inside have outlived their lifespans, and there are some."""

@@ -6,6 +6,7 @@ from sdrlinkd.link.qos import CLASSES, Qos
 from sdrlinkd.link.receive import PduHeard
 from sdrlinkd.link.schedule import Flow, Forecasts
 from sdrlinkd.link.transmit.fit import Fit
+from sdrlinkd.link.transmit.rate import SNR_STEP_DB
 from sdrlinkd.wire import CONTROL_TOPIC_ID, Beacon, Frame, Grant, LinkReport, Pdu, Record, Want
 
 Knows = Callable[[int, float], bool]
@@ -23,12 +24,15 @@ class Overheard:
         self._forecasts = forecasts
         self._own_id = own_id
         self._has_control = has_control
+        self._is_weak = False
+        """Whether the signal of the last PDU was weaker than PDUs need."""
 
     def pdu(self, event: PduHeard) -> None:
         """Note a valid PDU that another robot has sent."""
-        pdu, stamps, at, is_relayed = event
+        pdu, stamps, at, is_relayed, snr_db = event
         src = pdu.src
-        self._access.heard(src, at, is_relayed)
+        self._is_weak = snr_db is not None and self._too_weak(snr_db)
+        self._access.heard(src, at, is_relayed, is_weak=self._is_weak)
         if not is_relayed and self._knows(src, at):
             self._rate.heard(src, at)
         qos = CLASSES[pdu.qos]
@@ -63,12 +67,17 @@ class Overheard:
                 if self._knows(src, at):
                     self._rate.take(src, record, at)
             else:
-                self._access.told_of(record.node, at, src)
+                snr_db = SNR_STEP_DB * record.snr_quarter_db
+                self._access.told_of(record.node, at, src, is_weak=self._too_weak(snr_db))
         elif isinstance(record, Beacon):
             self._access.beacon(src, at)
         elif isinstance(record, Frame):
             self._access.take_frame(src, record, at)
         elif isinstance(record, Grant):
-            self._access.take_grant(src, record, at)
+            self._access.take_grant(src, record, at, is_weak=self._is_weak)
         elif isinstance(record, Want):
             self._access.take_want(src, record, at)
+
+    def _too_weak(self, snr_db: float) -> bool:
+        """Whether a signal is weaker than PDUs with the most robust MCS in use need."""
+        return snr_db < self._rate.least_snr_db
