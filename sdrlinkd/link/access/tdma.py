@@ -168,9 +168,9 @@ class Tdma(BusyChannel):
         self,
         node: int,
         at: float,
-        by: int,
+        by: int,  # noqa: ARG002  # not all ask for it
         *,
-        is_weak: bool = False,  # noqa: ARG002  # not all ask
+        is_weak: bool = False,  # noqa: ARG002  # not all ask for it
     ) -> None:
         """Note that robot `node` exists, whether we hear it or not."""
         if node != self._own_id:
