@@ -119,7 +119,7 @@ class BurstScheduler:
         )
 
     def _adopt(self) -> None:
-        """Ask for the air as the policy has it now: by request, or by telling what comes next."""
+        """Ask for the air as the policy has it now: by request, or by auction."""
         by_request, by_auction = self._access.by_request, self._access.by_auction
         self._adopted = by_request, by_auction
         self._turns = None if by_request is None else OwnTurns(
