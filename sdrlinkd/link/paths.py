@@ -11,6 +11,8 @@ LOSSY = 2.0
 """Exponent of the expected number of tries, until a PDU and its answer arrive, in the cost of a
 link: two hops that lose nothing are better than one that loses a sixth each way, as repeats take
 time, and may be lost, too."""
+HALF_BELOW_DB = 1.0
+"""How far below the SNR that is needed half of the PDUs are lost at least."""
 MOST_COST = 1e6
 """What a link costs at most. Beside much larger numbers, a link that costs 1 would cost nothing."""
 NEAR = 1.1

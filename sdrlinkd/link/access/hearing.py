@@ -5,13 +5,15 @@ from itertools import combinations
 from math import inf
 
 from sdrlinkd.link.access.team import DOUBTFUL, PRESENT_S
-from sdrlinkd.link.paths import Edges
+from sdrlinkd.link.paths import MOST_COST, Edges
 
 DEAF_S, POOR_S = 1.5, 5.0
 """Time in s for which two robots must have been here, and have told nothing of each other, or that
 they hear each other poorly, before they count as apart. After a pause, what came meanwhile counts
 as lost for some time."""
-GONE_S = 1.5
+UNHEARD_S = PRESENT_S
+"""Time in s for which others must have told of a robot that we do not hear, if LSAs do not tell."""
+GONE_S = 2.2
 """Time in s after which a robot of which nothing was heard begins anew."""
 
 Pair = tuple[int, int]
@@ -26,6 +28,7 @@ class Hearing:
         self._came_at: dict[int, float] = {}
         self._seen_at: dict[int, float] = {}
         """When we or somebody else heard each robot."""
+        self._heard_at: dict[int, float] = {}
         self._edges: Edges = {}
         self._poor_since: dict[Pair, float] = {}
         """Since when LSAs tell of two robots that they do not hear each other well."""
@@ -35,7 +38,12 @@ class Hearing:
         """Whether all hear all well, by the last look."""
 
     def heard(self, node: int, at: float) -> None:
-        """Note that we or somebody else has heard a robot."""
+        """Note that we hear a robot."""
+        self._heard_at[node] = at
+        self.told_of(node, at)
+
+    def told_of(self, node: int, at: float) -> None:
+        """Note that somebody hears a robot."""
         if node in self._nodes and node != self._own_id:
             seen_at = self._seen_at.get(node, -inf)
             if at > seen_at + GONE_S:
@@ -52,24 +60,35 @@ class Hearing:
         found, poor, deaf = None, dict[Pair, float](), dict[Pair, float]()
         for pair in combinations(sorted([self._own_id, *here]), 2):
             cost = self._cost(pair)
+            if cost is None:
+                if self._is_unheard(pair):
+                    found = found or pair
+                continue
             if cost <= DOUBTFUL:
                 continue
             poor[pair] = self._poor_since.get(pair, now)
             is_apart = self._were_here(pair, poor[pair], POOR_S)
-            if cost == inf:
+            if cost >= MOST_COST:
                 deaf[pair] = self._deaf_since.get(pair, now)
                 is_apart |= self._were_here(pair, deaf[pair], DEAF_S)
             if is_apart and found is None:
                 found = pair
         self._poor_since, self._deaf_since = poor, deaf
-        self.is_sure = not poor
+        self.is_sure = not poor and found is None
         return found
 
-    def _cost(self, pair: Pair) -> float:
-        """What a link costs; infinity: there is none. A robot without links tells nothing yet."""
+    def _cost(self, pair: Pair) -> float | None:
+        """What a link costs; infinity: there is none. None: a robot tells of no links yet."""
         one, other = pair
         links = self._edges.get(one)
-        return links.get(other, inf) if links and self._edges.get(other) else 0.0
+        return links.get(other, inf) if links and self._edges.get(other) else None
+
+    def _is_unheard(self, pair: Pair) -> bool:
+        """Whether we are one of two robots, and do not hear the other one."""
+        if self._own_id not in pair:
+            return False
+        (other,) = {*pair} - {self._own_id}
+        return self._were_here(pair, self._heard_at.get(other, -inf), UNHEARD_S)
 
     def _were_here(self, pair: Pair, since: float, for_s: float) -> bool:
         """Whether two robots were here for so long after `since`."""

@@ -6,7 +6,7 @@ from sdrlinkd.link.access.round_plan import Times
 from sdrlinkd.link.access.team import Places
 from sdrlinkd.link.access.turns import Round, Turn
 from sdrlinkd.link.access.urgent_turns import UrgentTurns
-from sdrlinkd.wire import ANYBODY, Grant
+from sdrlinkd.wire import Grant
 
 
 class KnownRounds:
@@ -87,7 +87,8 @@ class KnownRounds:
         if self.plan is None or self.plan[1].number == self._passed_on:
             return False
         return any(
-            node == ANYBODY or places.is_behind(node, self._own_id)
+            # Who is nowhere may be near to anybody.
+            node not in places.levels or places.is_behind(node, self._own_id)
             for node, ticks in self.plan[1].turns
             if ticks
         )

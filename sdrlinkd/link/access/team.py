@@ -12,6 +12,8 @@ from sdrlinkd.wire import FAR
 DOUBTFUL, DOUBTED_S = 4.0, 1.5
 """Cost of a link that was heard lately, and that LSAs do not tell; and for how long in s it counts,
 as it is one that is new or that has ended."""
+WEAK = 100.0
+"""Cost of a link whose signal is weaker than PDUs need, where LSAs do not tell."""
 FRESH_S = 0.5
 """How often, in s, links are forgotten of which nothing was heard."""
 SETTLED_S = 5.0
@@ -51,6 +53,8 @@ class Team:
         self._seen_at: dict[int, float] = {}
         self._lsa_edges: Edges = {}
         self._link_at: dict[tuple[int, int], float] = {}
+        self._weak: set[tuple[int, int]] = set()
+        """Those with a signal that is weaker than PDUs need."""
         self._expired_at = 0.0
         self._places: dict[int, Places] = {}
         self._apart: Apart | None = None
@@ -61,12 +65,12 @@ class Team:
     def told_of(self, node: int, at: float, by: int, *, is_weak: bool = False) -> None:
         """Note that robot `by`, we or another one, hears robot `node`.
 
-        If the signal is weaker than PDUs need, that counts only as long as LSAs do not tell.
+        If the signal is weaker than PDUs need, that counts for little, and not where LSAs tell.
         """
         is_known = {node, by} <= self._lsa_edges.keys()
         if {node, by} <= set(self.nodes) and node != by and not (is_weak and is_known):
             self.seen(node, at)
-            self._link(by, node, at)
+            self._link(min(by, node), max(by, node), at, is_weak=is_weak)
 
     def seen(self, node: int, at: float) -> None:
         """Note that a robot of the team is here, wherever it is."""
@@ -115,8 +119,11 @@ class Team:
         costs = self.places(root).costs
         return min(FAR, max((round(costs.get(node, FAR)) for node in others), default=FAR))
 
-    def _link(self, one: int, other: int, at: float) -> None:
-        link = min(one, other), max(one, other)
+    def _link(self, one: int, other: int, at: float, *, is_weak: bool) -> None:
+        link = one, other
+        if is_weak != (link in self._weak):
+            self._weak ^= {link}
+            self._changed()
         if link not in self._link_at or at > self._expired_at + FRESH_S:
             self._expired_at = at
             fresh = {each: told for each, told in self._link_at.items() if told > at - PRESENT_S}
@@ -138,6 +145,8 @@ class Team:
                 if at < self._expired_at - DOUBTED_S:
                     continue
                 cost = DOUBTFUL
+            elif (one, other) in self._weak:
+                cost = WEAK
             edges[one].setdefault(other, cost)
             edges[other].setdefault(one, cost)
         return edges

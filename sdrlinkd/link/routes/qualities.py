@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import exp
 
+from sdrlinkd.link.paths import HALF_BELOW_DB
 from sdrlinkd.wire import loss_of
 
 MEMORY_S = 2.0
@@ -11,9 +12,8 @@ PRIOR = 2.0
 """How many PDUs the SNR counts for, as long as few have come."""
 DB_PER_HALF = 1.5
 """Change of the SNR in dB that halves, or doubles, the odds that a PDU is lost."""
-HALF_BELOW_DB, CLIFF_DB = 1.0, 0.25
-"""How far below the SNR that is needed half of the PDUs are lost at least, and the change of the
-SNR in dB that doubles the odds of that."""
+CLIFF_DB = 0.25
+"""Change of the SNR in dB that doubles the odds that a PDU is lost, where half of them are."""
 MOST_STEP = 64
 """Most PDUs that one silence counts for."""
 FIRST_GAP_S = 1.0

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from sdrlinkd.link.paths import HALF_BELOW_DB
 from sdrlinkd.link.qos import CLASSES, Qos
 from sdrlinkd.link.receive import PduHeard
 from sdrlinkd.link.schedule import Flow, Forecasts
@@ -79,5 +80,5 @@ class Overheard:
             self._access.take_want(src, record, at)
 
     def _too_weak(self, snr_db: float) -> bool:
-        """Whether a signal is weaker than PDUs with the most robust MCS in use need."""
-        return snr_db < self._rate.least_snr_db
+        """Whether most PDUs with the most robust MCS in use get lost with such a signal."""
+        return snr_db < self._rate.least_snr_db - HALF_BELOW_DB
