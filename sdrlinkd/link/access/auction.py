@@ -103,7 +103,7 @@ class Auction(BusyChannel):
         """A quiet air, if something disturbs the pulses."""
         return "an air without other pulses" if self._is_disturbed else ""
 
-    def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # the same for all classes
+    def mean_wait_s(self, qos: Qos) -> float:
         """Mean wait in s: a quiet hand-over."""
         return self.pause_s
 
@@ -176,14 +176,7 @@ class Auction(BusyChannel):
             self._asked, silent_since = self._before
             self._wants.take_back(self._own_id, silent_since)
 
-    def heard(
-        self,
-        src: int,
-        at: float,
-        is_relayed: bool,
-        *,
-        is_weak: bool = False,  # noqa: ARG002  # weak ones count, too
-    ) -> None:
+    def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
         """Remember who was on the air."""
         if not is_relayed and self._wants.on_air(src, at):
             self._mute.add(src, at)

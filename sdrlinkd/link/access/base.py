@@ -200,11 +200,11 @@ class BusyChannel:
         self._bidding = Sightings()
         """Robots that take part in an auction."""
 
-    def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # not all ask for it
+    def mean_wait_s(self, qos: Qos) -> float:
         """Mean time in s from an idle channel to a burst of class `qos`: 0."""
         return 0.0
 
-    def sent(self, end: float, src: int | None) -> None:  # noqa: ARG002  # not all ask for it
+    def sent(self, end: float, src: int | None) -> None:
         """Remember a burst of ours that will be on the air until `end`."""
         self._own_ends = [*self._own_ends[-MOST_ON_THEIR_WAY:], end]
 
@@ -226,7 +226,7 @@ class BusyChannel:
     def beacon(self, src: int, at: float) -> None:
         """Ignore beacons, as no turn depends on them."""
 
-    def take_want(self, src: int, want: Want, at: float) -> None:  # noqa: ARG002  # whatever it is
+    def take_want(self, src: int, want: Want, at: float) -> None:
         """Remember that robot `src` tells what it wants and so uses another policy."""
         self._bidding.add(src, at)
 
@@ -239,7 +239,7 @@ class BusyChannel:
     def frame(self, start: float) -> Frame | None:
         """The schedule to announce: None, as no schedule is kept."""
 
-    def take_frame(self, src: int, frame: Frame, at: float) -> None:  # noqa: ARG002  # not all ask
+    def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """Remember that robot `src` keeps a schedule and so uses another policy."""
         self._scheduled.add(src, at)
 

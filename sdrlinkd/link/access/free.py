@@ -51,14 +51,7 @@ class Free(BusyChannel):
     def sent(self, end: float, src: int | None) -> None:
         """Ignore our bursts, as nothing depends on when they end."""
 
-    def heard(
-        self,
-        src: int,
-        at: float,
-        is_relayed: bool,
-        *,
-        is_weak: bool = False,  # noqa: ARG002  # weak ones count, too
-    ) -> None:
+    def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
         """Remember that another robot is on this channel after all."""
         if self._is_alone and not is_relayed:
             self._others.add(src, at)

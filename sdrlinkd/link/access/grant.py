@@ -88,7 +88,7 @@ class Grants(BusyChannel):
         leads, lacks = self.leads, self._rounds.lacks(self._asked_at)
         return "" if leads.is_root else lacks if leads.follows else "a plan"
 
-    def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # the same for all classes
+    def mean_wait_s(self, qos: Qos) -> float:
         """Mean wait in s: half a round."""
         return self.round_s / 2
 
@@ -230,7 +230,7 @@ class Grants(BusyChannel):
         """Remember whose plan the next GRANT of this burst tells."""
         self._frames.take(src, frame, at)
 
-    def take_want(self, src: int, want: WantRecord, at: float) -> None:  # noqa: ARG002  # or by a relay
+    def take_want(self, src: int, want: WantRecord, at: float) -> None:
         """Take what a robot wants, or pass it on to the root."""
         if want.node not in self._team.nodes or want.node == self._own_id:
             return

@@ -123,14 +123,7 @@ class MiniSlots(BusyChannel):
         super().sent(end, src)
         self._own_src = src
 
-    def heard(
-        self,
-        src: int,
-        at: float,
-        is_relayed: bool,
-        *,
-        is_weak: bool = False,  # noqa: ARG002  # weak ones count, too
-    ) -> None:
+    def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
         """Remember the last sender, which determines the order within a level."""
         self._last = (src, at, is_relayed)
 

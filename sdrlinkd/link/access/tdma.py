@@ -152,26 +152,12 @@ class Tdma(BusyChannel):
                 return Slot(start, planned_end, end)
         return None
 
-    def heard(
-        self,
-        src: int,
-        at: float,
-        is_relayed: bool,
-        *,
-        is_weak: bool = False,  # noqa: ARG002  # weak ones count, too
-    ) -> None:
+    def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
         """Note that we hear robot `src` directly."""
         if not is_relayed:
             self._heard_at[src] = at
 
-    def told_of(
-        self,
-        node: int,
-        at: float,
-        by: int,  # noqa: ARG002  # not all ask for it
-        *,
-        is_weak: bool = False,  # noqa: ARG002  # not all ask for it
-    ) -> None:
+    def told_of(self, node: int, at: float, by: int, *, is_weak: bool = False) -> None:
         """Note that robot `node` exists, whether we hear it or not."""
         if node != self._own_id:
             self._told_of_at[node] = at
