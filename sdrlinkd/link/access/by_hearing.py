@@ -152,7 +152,7 @@ class ByHearing:
         """Note that a burst has not left; a first plan is told in another one."""
         self._auction.not_sent(start)
         self._grants.not_sent(start)
-        if start == self._first_plan_at and self._in_use is self._grants:
+        if start == self._first_plan_at and self._grants.plans:
             self._grants.end()
             self._in_use, self._begins_at = self._auction, start
 

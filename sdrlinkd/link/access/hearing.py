@@ -5,12 +5,14 @@ from itertools import combinations
 from math import inf
 
 from sdrlinkd.link.access.team import DOUBTFUL, PRESENT_S
-from sdrlinkd.link.paths import MOST_COST, Edges
+from sdrlinkd.link.paths import Edges
 
 DEAF_S, POOR_S = 1.5, 5.0
 """Time in s for which two robots must have been here, and have told nothing of each other, or that
 they hear each other poorly, before they count as apart. After a pause, what came meanwhile counts
 as lost for some time."""
+DEAF_COST = 1e4
+"""Cost of a link on which next to nothing arrives."""
 UNHEARD_S = PRESENT_S
 """Time in s for which others must have told of a robot that we do not hear, if LSAs do not tell."""
 GONE_S = 2.2
@@ -68,7 +70,7 @@ class Hearing:
                 continue
             poor[pair] = self._poor_since.get(pair, now)
             is_apart = self._were_here(pair, poor[pair], POOR_S)
-            if cost >= MOST_COST:
+            if cost >= DEAF_COST:
                 deaf[pair] = self._deaf_since.get(pair, now)
                 is_apart |= self._were_here(pair, deaf[pair], DEAF_S)
             if is_apart and found is None:
