@@ -152,12 +152,8 @@ class Answers:
         """When the next PDU may be repeated; infinity: none waits."""
         if not self.wanted:
             return inf
-        twice_at = asked_at = inf
-        for each in self.wanted.values():
-            if each.askers:
-                asked_at = min(asked_at, each.due_at)
-            else:
-                twice_at = min(twice_at, each.due_at)
+        twice_at = min((e.due_at for e in self.wanted.values() if not e.askers), default=inf)
+        asked_at = min((e.due_at for e in self.wanted.values() if e.askers), default=inf)
         return min(twice_at, max(asked_at, self._budget.free_at(now)))
 
     def due_class(self, start: float, next_number: int) -> Qos | None:
