@@ -10,10 +10,12 @@ import sys
 import time
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from multiprocessing.connection import Connection, wait
-from typing import Generic, NamedTuple, Self, TypeVar
+from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 from benchmarks.absent import PeerError, attempt
 
+LOOK_S = 0.5
+"""How often to look whether the keyboard has interrupted us, in s."""
 T = TypeVar("T")
 Key = TypeVar("Key", bound=Hashable)
 
@@ -54,11 +56,18 @@ class Runs:
         self._waiting: list[Run] = []  # type: ignore[type-arg]
         self._under_way: dict[Connection, _UnderWay] = {}
         self._n_over = 0
+        self._is_interrupted = False
+        self._before: Any = None
+        """What an interrupt does outside of the block."""
 
     def __enter__(self) -> Self:
+        # An exception raised by a signal may be lost in a callback of Python's. In the processes
+        # of the simulations, which inherit this, an interrupt does nothing.
+        self._before = signal.signal(signal.SIGINT, self._interrupt)
         return self
 
     def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
         self._waiting.clear()
         for ours, each in self._under_way.items():
             each.process.kill()
@@ -78,8 +87,13 @@ class Runs:
         while not run.is_over:
             while self._waiting and len(self._under_way) < self._processes:
                 self._start(self._waiting.pop())
-            for ours in wait([*self._under_way]):
+            for ours in wait([*self._under_way], LOOK_S):
                 self._finish(ours)  # type: ignore[arg-type]  # these are connections
+            if self._is_interrupted:
+                raise KeyboardInterrupt
+
+    def _interrupt(self, *_: object) -> None:
+        self._is_interrupted = True
 
     def _start(self, run: Run[T]) -> None:
         ours, theirs = multiprocessing.Pipe(duplex=False)
@@ -118,8 +132,6 @@ def all_of(runs: Iterable[Run[T]]) -> list[T]:
 
 
 def _work(what: Callable[[], T], theirs: Connection) -> None:
-    # The keyboard interrupts the process that waits for us, and that one ends us.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         told: tuple[T | None, Exception | None] = what(), None
     except Exception as error:  # It is raised where the result is used.
