@@ -75,8 +75,9 @@ def test_robots_that_no_path_leads_to_do_not_count():
     assert {node for node, _ in plan.turns} <= {1, 3, ANYBODY}
 
 
-@pytest.mark.parametrize(("snr_db", "doing"), [(5.0, "listening"), (7.0, "planned by robot 2")])
+@pytest.mark.parametrize(("snr_db", "doing"), [(4.9, "listening"), (5.0, "planned by robot 2")])
 def test_the_snr_tells_whether_a_signal_is_weak(snr_db, doing):
+    """It is if it is more than 1 dB below what PDUs need."""
     link = make_link(1, pdu_size=256)
     link.attach(TRAITS._replace(needed_snr_db=(6.0,)), params("grant", (1, 2)), RateParams())
     builder = PduBuilder(256)

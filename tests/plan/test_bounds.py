@@ -29,7 +29,9 @@ def test_no_urgent_message_waits_longer_than_planned(policy, n, duration_s):
 @pytest.mark.slow
 def test_a_bound_without_one_of_its_terms_is_broken():
     told = strain("auction", 8, 1, 8.0, is_calm=True)
-    assert (told.broken, told.in_outages) == (0, 0)
+    assert told.broken == 0
+    # At the begin, robots listen for a round.
+    assert told.in_outages < 0.05 * told.n
     # A contest takes longer than what is left.
     assert told.longest_s > 0.85 * told.bound_s
 
