@@ -12,10 +12,11 @@ from benchmarks.team.teams import Flow, Strain, Team
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Qos, Sensed
 from sdrlinkd.link.access import BACK_S, Waiting, Wish, make_access
-from sdrlinkd.wire import LAST_PLAN, Frame, Grant, Want
+from sdrlinkd.wire import LAST_PLAN, Frame, Grant
 from tests.laws import law
 from tests.link.pulsing import FAST
 from tests.link.radios import params
+from tests.link.turns import tell, told_events
 
 LONGEST_S = 0.004
 PDU_S = 0.0005
@@ -102,6 +103,8 @@ def test_where_all_hear_all_losses_and_robots_that_leave_end_no_auction(relays):
 
 
 TOGETHER = {1: {2: 1.0, 3: 1.0}, 2: {1: 1.0, 3: 1.0}, 3: {1: 1.0, 2: 1.0}}
+APART = {1: {2: 1.0, 3: 1.0}, 2: {1: 1.0}, 3: {1: 1.0}}
+"""Robots 2 and 3 do not hear each other."""
 
 
 def access_with(edges=TOGETHER, seconds=10):
@@ -126,7 +129,7 @@ def ask(access, now):
 
 def schedule():
     """What identifies the schedule: that of a robot that has begun to plan."""
-    access, now = access_with({1: {2: 1.0, 3: 1.0}, 2: {1: 1.0}, 3: {1: 1.0}})
+    access, now = access_with(APART)
     for _ in range(9000):
         now += 1e-3
         slot = ask(access, now)
@@ -199,17 +202,17 @@ def test_a_robot_that_has_gone_is_not_one_that_others_do_not_hear():
 
 octet, times = st.integers(0, 255), st.floats(-1, 3)
 whatever = st.one_of(
-    st.tuples(st.just("frame"), octet, octet, octet, st.booleans(), st.integers(0, 1 << 20)),
+    told_events,
     st.tuples(
-        st.just("grant"), octet, octet, octet, st.integers(0, 1 << 20),
-        st.lists(st.tuples(octet, octet), max_size=4) | st.just([*LAST_PLAN]),
+        st.just("plan"),
+        st.integers(1, 3),
+        octet,
+        st.lists(st.tuples(st.integers(1, 3), octet), max_size=4) | st.just([*LAST_PLAN]),
     ),
-    st.tuples(st.just("want"), octet, st.integers(0, 3), octet, octet),
-    st.tuples(st.just("of"), octet, octet),
-    st.tuples(st.just("links"), octet, octet),
+    st.tuples(st.just("links for long"), st.sampled_from([TOGETHER, APART])),
     st.tuples(st.just("late"), octet),
     st.tuples(st.just("sensed"), octet, times, st.lists(times, max_size=4)),
-)  # fmt: skip
+)
 
 
 @law()
@@ -217,32 +220,25 @@ whatever = st.one_of(
 def test_whatever_is_heard_slots_are_sound(events, own_id):
     access = make_access(params("auction", [1, 2, 3]), own_id, RADIO, LONGEST_S, Random(1))
     now, sensed, last = 1.0, Sensed(1.0, 0.0), 0.0
-    for kind, *fields in events:
+    for event in events:
+        kind, *fields = event
         now += 0.03
-        src = fields[0] % 4
-        if kind == "frame":
-            _, root, level, is_ours, phase_us = fields
-            access.take_frame(
-                src, Frame(root % 4, level, SCHEDULE if is_ours else 1, phase_us), now
-            )
-        elif kind == "grant":
-            _, number, reach, begins_us, turns = fields
-            at = now - 0.03 if number % 2 else now
-            access.take_grant(src, Grant(number, reach, begins_us, tuple(turns)), at)
-        elif kind == "want":
-            access.take_want(src, Want(src, fields[1], 64, 1, *fields[2:]), now)
-        elif kind == "of":
-            access.heard(src, now, False)
-            access.told_of(src, now, fields[1] % 4)
-            access.beacon(src, now)
-        elif kind == "links":
-            access.know_links({src: {fields[1] % 4: 1.0}, fields[1] % 4: {src: 1.0}})
-            now += 1.5
-        elif kind == "late":
+        if kind == "late":
             access.not_sent(last)
-        else:
+        elif kind == "plan":
+            src, number, turns = fields
+            access.take_frame(src, Frame(src, 0, SCHEDULE, 0), now)
+            access.take_grant(src, Grant(number, 1, 1000, tuple(turns)), now)
+        elif kind == "links for long":
+            access.know_links(fields[0])
+            for _ in range(8):
+                now += 0.5
+                beacons(access, now)
+        elif kind == "sensed":
             end, pulses = fields[1:]
             sensed = Sensed(now, end, None, end, None, tuple(sorted(pulses)))
+        else:
+            tell(access, event, SCHEDULE, now, 0.03)
         sensed = sensed._replace(until=now)
         slot = access.slot(
             Wish(now, Qos.LATENCY, PDU_S, sensed, Waiting(Qos.LATENCY, 64, 0.1, 0.002, 0.5))

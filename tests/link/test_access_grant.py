@@ -32,7 +32,7 @@ from sdrlinkd.link.access import (
 from sdrlinkd.wire import ANYBODY, Frame, Grant, Want, build_records
 from tests.laws import law
 from tests.link.radios import params
-from tests.link.turns import LONGEST_S, PDU_S, ROOM, STEP_S, TRAITS, Team
+from tests.link.turns import LONGEST_S, PDU_S, ROOM, STEP_S, TRAITS, Team, tell, told_events
 
 FORMED_S = 3.0
 TIMES = Times(Ticks(1e-4, 2e-4), PDU_S, 0.02, LONGEST_S, 3e-4, 5e-4)
@@ -454,45 +454,14 @@ def test_what_is_expected_starves_nobody(node, every_s, has_bulk):
         assert longest_s <= 2 * root.round_s + 0.25 * (other == ANYBODY)
 
 
-octet = st.integers(0, 255)
-whatever = st.one_of(
-    st.tuples(st.just("frame"), octet, octet, octet, st.booleans(), st.integers(0, 10**6)),
-    st.tuples(
-        st.just("grant"),
-        octet,
-        octet,
-        octet,
-        st.one_of(st.integers(0, 50_000), st.integers(0, 2**32 - 1)),
-        st.lists(st.tuples(st.sampled_from([0, 1, 2, 3, 9, 255]), octet), max_size=20),
-    ),
-    st.tuples(st.just("want"), octet, st.integers(0, 3), octet, octet),
-    st.tuples(st.just("of"), octet, octet),
-    st.tuples(st.just("links"), octet, octet),
-)
-
-
 @law()
-@given(st.lists(whatever, max_size=40), st.integers(1, 3))
+@given(st.lists(told_events, max_size=40), st.integers(1, 3))
 def test_whatever_is_told_turns_stay_within_bounds(events, own_id):
     access = make_access(params("grant", [1, 2, 3]), own_id, TRAITS, LONGEST_S, Random(1))
     now = 1.0
-    for kind, *fields in events:
+    for event in events:
         now += 0.003
-        src = fields[0] % 4
-        if kind == "frame":
-            _, root, level, is_ours, phase_us = fields
-            schedule = schedule_of((1, 2, 3)) if is_ours else 1
-            access.take_frame(src, Frame(root % 4, level, schedule, phase_us), now)
-        elif kind == "grant":
-            _, number, reach, begins_us, turns = fields
-            at = now - 0.003 if number % 2 else now
-            access.take_grant(src, Grant(number, reach, begins_us, tuple(turns)), at)
-        elif kind == "want":
-            access.take_want(src, Want(src, fields[1], 64, 1, *fields[2:]), now)
-        elif kind == "of":
-            access.told_of(src, now, fields[1] % 4)
-        else:
-            access.know_links({src: {fields[1] % 4: 1.0}, fields[1] % 4: {src: 1.0}})
+        tell(access, event, schedule_of((1, 2, 3)), now, 0.003)
         waiting = Waiting(Qos.LATENCY, 64, 0.1, 0.002, 0.5)
         slot = access.slot(Wish(now, Qos.LATENCY, PDU_S, Sensed(now, now - 1.0), waiting))
         assert access.tells_at >= 0

@@ -4,8 +4,11 @@ from itertools import islice
 from random import Random
 from typing import NamedTuple
 
+from hypothesis import strategies as st
+
 from sdrlinkd.link import PduLinkTraits, Qos, Sensed
 from sdrlinkd.link.access import Waiting, Wish, make_access
+from sdrlinkd.wire import Frame, Grant, Want
 from tests.link.radios import params
 
 PDU_S, LONGEST_S, STEP_S = 5e-4, 4e-3, 2e-4
@@ -198,3 +201,41 @@ class Team:
         return self.hears(one, other) or any(
             self.hears(one, node) and self.hears(other, node) for node in self.robots
         )
+
+
+octet = st.integers(0, 255)
+told_events = st.one_of(
+    st.tuples(st.just("frame"), octet, octet, octet, st.booleans(), st.integers(0, 10**6)),
+    st.tuples(
+        st.just("grant"),
+        octet,
+        octet,
+        octet,
+        st.one_of(st.integers(0, 50_000), st.integers(0, 2**32 - 1)),
+        st.lists(st.tuples(st.sampled_from([0, 1, 2, 3, 9, 255]), octet), max_size=20),
+    ),
+    st.tuples(st.just("want"), octet, st.integers(0, 3), octet, octet),
+    st.tuples(st.just("of"), octet, octet),
+    st.tuples(st.just("links"), octet, octet),
+)
+"""Whatever a robot may be told: (kind, robot, more)."""
+
+
+def tell(access, event, schedule, now, since_s):
+    """Let a policy take such an event at `now`; the last one was `since_s` before."""
+    kind, *fields = event
+    src = fields[0] % 4
+    if kind == "frame":
+        _, root, level, is_ours, phase_us = fields
+        access.take_frame(src, Frame(root % 4, level, schedule if is_ours else 1, phase_us), now)
+    elif kind == "grant":
+        _, number, reach, begins_us, turns = fields
+        at = now - since_s if number % 2 else now
+        access.take_grant(src, Grant(number, reach, begins_us, tuple(turns)), at)
+    elif kind == "want":
+        access.take_want(src, Want(src, fields[1], 64, 1, *fields[2:]), now)
+    elif kind == "of":
+        access.heard(src, now, False)
+        access.told_of(src, now, fields[1] % 4)
+    else:
+        access.know_links({src: {fields[1] % 4: 1.0}, fields[1] % 4: {src: 1.0}})

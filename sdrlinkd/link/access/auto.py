@@ -1,4 +1,4 @@
-"""Chooses the access policy that fits the radio, by the share of airtime that each can use."""
+"""Chooses the access policy that fits the radio, by how fast it reacts and what each carries."""
 
 import math
 from collections.abc import Mapping

@@ -144,7 +144,7 @@ class Access(Protocol):
     def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
         """Note a PDU of robot `src`, in a burst whose preamble was at `at`, possibly relayed.
 
-        `is_weak`: the signal is weaker than PDUs need, so this one came by luck.
+        `is_weak`: most PDUs get lost with such a signal, so this one came by luck.
         """
 
     def told_of(self, node: int, at: float, by: int, *, is_weak: bool = False) -> None:

@@ -9,9 +9,7 @@ time, the root tells its last plan, and the auction goes on after it.
 from math import inf
 
 from sdrlinkd.link.access.auction import Auction
-from sdrlinkd.link.access.base import Slot, Wish
-from sdrlinkd.link.access.by_auction import ByAuction
-from sdrlinkd.link.access.by_request import ByRequest
+from sdrlinkd.link.access.base import BusyChannel, Slot, Wish
 from sdrlinkd.link.access.grant import Grants
 from sdrlinkd.link.access.hearing import Hearing, Pair
 from sdrlinkd.link.paths import Edges
@@ -28,21 +26,21 @@ LOOK_S = 0.05
 """How often, in s, a robot looks at who hears whom."""
 
 
-class ByHearing:
+class ByHearing(BusyChannel):
     """The access policy `auction` with its fall-back to `grant`.
 
     Both know who is heard and what was sent, whichever is in use.
     """
 
-    keeps_schedule = False
     needs_links = True
     least_room = max(Auction.least_room, Grants.least_room)
 
     def __init__(self, auction: Auction, grants: Grants, hearing: Hearing) -> None:
+        super().__init__()
         self._auction = auction
         self._grants = grants
         self._hearing = hearing
-        self._in_use: Auction | Grants = auction
+        self._use(auction)
         self._is_new = True
         """Whether others may have turns of which we have not heard yet."""
         self._looked_at = -inf
@@ -64,56 +62,16 @@ class ByHearing:
         return self._auction.state + (f"; ends, as {self._why}" if self._pair else "")
 
     @property
-    def lacks(self) -> str:
+    def lacks(self) -> str:  # type: ignore[override]
         """What the policy in use lacks. While the auction begins or ends, that is turns."""
         if self._in_use is self._auction and (self._is_new or self._pair is not None):
             return "turns by request"
         return self._in_use.lacks
 
     @property
-    def round_s(self) -> float:
-        """That of the policy in use."""
-        return self._in_use.round_s
-
-    @property
-    def pause_s(self) -> float:
-        """That of the policy in use."""
-        return self._in_use.pause_s
-
-    @property
-    def share(self) -> float:
-        """That of the policy in use."""
-        return self._in_use.share
-
-    @property
-    def step_s(self) -> float:
-        """That of the policy in use."""
-        return self._in_use.step_s
-
-    @property
-    def others_follow(self) -> bool:
-        """Whether others may use what we leave free, in the policy in use."""
-        return self._in_use.others_follow
-
-    @property
-    def own_end(self) -> float:
-        """Time when our own last burst ends."""
-        return self._in_use.own_end
-
-    @property
-    def tells_at(self) -> float:
+    def tells_at(self) -> float:  # type: ignore[override]
         """When we have a plan to tell."""
         return self._begins_at if self._in_use is self._auction else self._grants.tells_at
-
-    @property
-    def by_request(self) -> ByRequest | None:
-        """`grant`, while it is in use."""
-        return self._in_use.by_request
-
-    @property
-    def by_auction(self) -> ByAuction | None:
-        """`auction`, while it is in use."""
-        return self._in_use.by_auction
 
     def mean_wait_s(self, qos: Qos) -> float:
         """That of the policy in use."""
@@ -143,6 +101,7 @@ class ByHearing:
 
     def sent(self, end: float, src: int | None) -> None:
         """Note our burst; the auction goes on after a last plan."""
+        super().sent(end, src)
         self._auction.sent(end, src)
         self._grants.sent(end, src)
         if self._grants.has_ended:
@@ -150,11 +109,13 @@ class ByHearing:
 
     def not_sent(self, start: float) -> None:
         """Note that a burst has not left; a first plan is told in another one."""
+        super().not_sent(start)
         self._auction.not_sent(start)
         self._grants.not_sent(start)
         if start == self._first_plan_at and self._grants.plans:
             self._grants.end()
-            self._in_use, self._begins_at = self._auction, start
+            self._use(self._auction)
+            self._begins_at = start
 
     def heard(self, src: int, at: float, is_relayed: bool, *, is_weak: bool = False) -> None:
         """Note who is heard."""
@@ -176,16 +137,11 @@ class ByHearing:
 
     def beacon(self, src: int, at: float) -> None:
         """Look at who hears whom, also where nothing is to be sent."""
-        self._in_use.beacon(src, at)
         self._look(at)
 
     def take_want(self, src: int, want: Want, at: float) -> None:
         """Take what a robot wants, for the policy in use."""
         self._in_use.take_want(src, want, at)
-
-    def frame(self, start: float) -> Frame | None:
-        """No schedule: plans tell FRAMEs by themselves."""
-        return self._in_use.frame(start)
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """Take the FRAME that comes with a plan."""
@@ -239,9 +195,17 @@ class ByHearing:
         """Go on by request."""
         is_flap = now < self._back_at + FLAP_S
         self._back_s = min(2 * self._back_s, MOST_BACK_S) if is_flap else BACK_S
-        self._in_use, self._begins_at = self._grants, inf
+        self._use(self._grants)
+        self._begins_at = inf
 
     def _go_back(self, now: float) -> None:
         """Go on by auction."""
         self._grants.end()
-        self._in_use, self._begins_at, self._back_at = self._auction, inf, now
+        self._use(self._auction)
+        self._begins_at, self._back_at = inf, now
+
+    def _use(self, access: Auction | Grants) -> None:
+        self._in_use = access
+        self.by_request, self.by_auction = access.by_request, access.by_auction
+        self.round_s, self.pause_s, self.share = access.round_s, access.pause_s, access.share
+        self.others_follow = access.others_follow

@@ -102,6 +102,7 @@ def make_access(
 
 
 def make_auction(params: AccessParams, own_id: int, traits: PduLinkTraits) -> Auction:
+    """The auction itself, without a fall-back. Raises ConfigError if the radio sends no pulses."""
     if not traits.pulse_s:
         raise ConfigError(
             f'access.policy: got "auction", but the backend "{traits.kind}" sends no pulses; '

@@ -23,6 +23,7 @@ from sdrlinkd.link.access.strays import Strays
 from sdrlinkd.link.access.tdma_states import Happens
 from sdrlinkd.link.access.team import Team
 from sdrlinkd.link.access.turns import ALMOST_S
+from sdrlinkd.link.access.urgent_turns import UrgentTurns
 from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import ANYBODY, LAST_PLAN, WANT_SIZE, Frame, Record
@@ -63,7 +64,9 @@ class Grants(BusyChannel):
         """Whose plans are kept."""
         self._planner = Planner(own_id, self._team, times)
         self._request = OwnRequest(own_id, times, self.round_s)
-        self._rounds = KnownRounds(own_id, times, len(nodes))
+        self._rounds = KnownRounds(own_id, times)
+        self._urgent = UrgentTurns(own_id, len(nodes), times)
+        """Who always asks for urgent turns."""
         self._behind: dict[int, WantRecord] = {}
         """Requests to pass on to the root."""
         self._open = OpenTurns(rng)
@@ -165,7 +168,7 @@ class Grants(BusyChannel):
     def request(self, start: float, left: Waiting | None) -> WantRecord | None:
         """What to ask the root for, unless it knows."""
         if self.leads.is_root:
-            self._rounds.urgent.waits(left, start)
+            self._urgent.waits(left, start)
         elif left is not None:
             return self._request.of(left, start)
         return None
@@ -173,7 +176,7 @@ class Grants(BusyChannel):
     def requested(self, want: WantRecord, start: float) -> None:
         """Note what the root knows from now on."""
         self._request.told(want, start)
-        self._rounds.urgent.asks(want, start)
+        self._urgent.asks(want, start)
 
     def told(self, start: float, length_s: float, room: int) -> list[Record]:
         """The plan of the next round, or the one that we pass on, with requests to pass on."""
@@ -186,6 +189,7 @@ class Grants(BusyChannel):
             if self.ends:
                 grant, self.has_ended = grant._replace(turns=LAST_PLAN), True
             self._rounds.made(made)
+            self._urgent.take(made)
             return [Frame(self._own_id, 0, self._frames.schedule, 0), grant]
         records: list[Record] = []
         plan = self._rounds.pass_on() if self._must_pass_on() else None
@@ -234,7 +238,7 @@ class Grants(BusyChannel):
         """Take what a robot wants, or pass it on to the root."""
         if want.node not in self._team.nodes or want.node == self._own_id:
             return
-        self._rounds.urgent.asks(want, at)
+        self._urgent.asks(want, at)
         if self.leads.is_root:
             self._planner.take(want, at)
         elif self._team.places(self.leads.root).is_behind(want.node, self._own_id):
@@ -256,13 +260,14 @@ class Grants(BusyChannel):
         last = self._rounds.last
         if follows and self._rounds.take(since, grant, found):
             self._request.given(found)
+            self._urgent.take(found)
             if last is not None:
                 self.ahead_s = min(max(0.0, found.begin - last.begin), self.round_s)
 
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that keep another schedule, or none, or always want urgent."""
         found = self._frames.notices(self.state, now) + self._strays.notices(now)
-        return found + self._rounds.urgent.notices(now)
+        return found + self._urgent.notices(now)
 
     def begin(self, wish: Wish, start: float) -> Slot:
         """Plan from our burst at `start` on, where nobody did so before."""

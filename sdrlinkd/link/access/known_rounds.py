@@ -5,24 +5,20 @@ from collections.abc import Iterator
 from sdrlinkd.link.access.round_plan import Times
 from sdrlinkd.link.access.team import Places
 from sdrlinkd.link.access.turns import Round, Turn
-from sdrlinkd.link.access.urgent_turns import UrgentTurns
 from sdrlinkd.wire import Grant
 
 
 class KnownRounds:
     """The rounds that go on or will begin, as far as robot `own_id` knows them.
 
-    Two plans whose rounds begin less than a least turn apart may be the same. `n` is the number of
-    robots.
+    Two plans whose rounds begin less than a least turn apart may be the same.
     """
 
-    def __init__(self, own_id: int, times: Times, n: int) -> None:
+    def __init__(self, own_id: int, times: Times) -> None:
         self._own_id = own_id
         self._same_s = times.turn_s
         self._root_s = times.root_s
         """Longest time from the end of a round until the plan of the next one is known."""
-        self.urgent = UrgentTurns(own_id, n, times)
-        """Who always asks for urgent turns."""
         self._had_turn = False
         """Whether a plan of this root had a turn of ours."""
         self._rounds: list[Round] = []
@@ -50,7 +46,6 @@ class KnownRounds:
     def made(self, found: Round) -> None:
         """Go on with a round of our own."""
         self._rounds = [found]
-        self.urgent.take(found)
 
     def take(self, since: float, grant: Grant, found: Round) -> bool:
         """Take the round of a plan that counts from `since`; returns whether it is a new one."""
@@ -62,7 +57,6 @@ class KnownRounds:
         self.plan = since, grant
         self._had_turn |= any(turn.node == self._own_id for turn in found.turns)
         self._rounds = [*(each.until(found.begin) for each in self._rounds[-1:]), found]
-        self.urgent.take(found)
         return True
 
     def own_turns(self) -> Iterator[Turn]:

@@ -122,12 +122,9 @@ class Leadership:
 
     def place(self, now: float) -> int:
         """How many robots that are here would be better roots than we."""
-        here = self._team.present(now)
-        own = self._own_rank(now)
-        everybody = {self._own_id, *here}
-        return sum(
-            (self._team.reach(node, everybody - {node}), node) < own for node in here
-        )  # fmt: skip
+        here, own = self._team.present(now), self._own_rank(now)
+        everybody, reach = {self._own_id, *here}, self._team.reach
+        return sum((reach(node, everybody - {node}), node) < own for node in here)
 
     def is_lost(self, now: float) -> bool:
         """Whether the root that we follow has told no plan for long."""
@@ -145,7 +142,7 @@ class Leadership:
         """Take the plan of a round that robot `src` tells: (whether we follow it, whether its root
         is new).
 
-        `is_weak`: the signal was weaker than PDUs need. Then the plan came by luck, and would
+        `is_weak`: most PDUs get lost with such a signal. Then the plan came by luck, and would
         silence us until the next one does. It only counts where plans come all the time.
         """
         root, level = frame.root, frame.level + 1

@@ -13,7 +13,7 @@ DOUBTFUL, DOUBTED_S = 4.0, 1.5
 """Cost of a link that was heard lately, and that LSAs do not tell; and for how long in s it counts,
 as it is one that is new or that has ended."""
 WEAK = 100.0
-"""Cost of a link whose signal is weaker than PDUs need, where LSAs do not tell."""
+"""Cost of a link whose signal is so weak that most PDUs get lost, where LSAs do not tell."""
 FRESH_S = 0.5
 """How often, in s, links are forgotten of which nothing was heard."""
 SETTLED_S = 5.0
@@ -54,7 +54,7 @@ class Team:
         self._lsa_edges: Edges = {}
         self._link_at: dict[tuple[int, int], float] = {}
         self._weak: set[tuple[int, int]] = set()
-        """Those with a signal that is weaker than PDUs need."""
+        """Those with such a weak signal."""
         self._expired_at = 0.0
         self._places: dict[int, Places] = {}
         self._apart: Apart | None = None
@@ -65,7 +65,8 @@ class Team:
     def told_of(self, node: int, at: float, by: int, *, is_weak: bool = False) -> None:
         """Note that robot `by`, we or another one, hears robot `node`.
 
-        If the signal is weaker than PDUs need, that counts for little, and not where LSAs tell.
+        If the signal is so weak that most PDUs get lost, that counts for little, and not where LSAs
+        tell.
         """
         is_known = {node, by} <= self._lsa_edges.keys()
         if {node, by} <= set(self.nodes) and node != by and not (is_weak and is_known):

@@ -26,7 +26,7 @@ class Overheard:
         self._own_id = own_id
         self._has_control = has_control
         self._is_weak = False
-        """Whether the signal of the last PDU was weaker than PDUs need."""
+        """Whether most PDUs get lost with the signal of the last one, whose records come next."""
 
     def pdu(self, event: PduHeard) -> None:
         """Note a valid PDU that another robot has sent."""
