@@ -40,6 +40,10 @@ class Links:
         """Counts the changes of `edges`."""
         return self._table.version
 
+    def number_from(self, first: int) -> None:
+        """Give our next LSA the number after `first`."""
+        self._table.number_from(first)
+
     def take(self, teller: int, lsa: Lsa, at: float) -> None:
         """Take an LSA record that robot `teller` told directly."""
         if lsa.node == BROADCAST:

@@ -1,7 +1,6 @@
 """The routes of a robot as one object: what it relays, whom it names, and what it answers."""
 
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 from sdrlinkd.link.paths import Edges
@@ -49,7 +48,7 @@ class Routes:
         """Whether this robot relays any PDUs."""
         self.lifespan_s = params.lifespan_s
         """Longest wait in s of a PDU to be relayed."""
-        self._draw_links = partial(Links, own_id, room, draw)
+        self._draw = draw
         self._links = Links(own_id, room, draw if self.is_auto else lambda: 0)
         self.tells_links = self.is_auto
         """Whether this robot tells whom it hears."""
@@ -64,7 +63,8 @@ class Routes:
     def tell_links(self) -> None:
         """Tell whom we hear, whatever is relayed."""
         if not self.tells_links:
-            self.tells_links, self._links = True, self._draw_links()
+            self.tells_links = True
+            self._links.number_from(self._draw())
 
     def set_needed_snr(self, needed_db: float) -> None:
         """Set the SNR in dB that the most robust MCS in use needs."""

@@ -31,7 +31,7 @@ class LsaTable:
     def __init__(self, own_id: int, first: int) -> None:
         self._own_id = own_id
         self._held: dict[int, _Held] = {}
-        self._number = first % LSA_NUMBERS
+        self.number_from(first)
         self._told_at = -inf
         self._is_overtaken = False
         """Whether others hold an LSA of ours that is newer than ours."""
@@ -41,6 +41,10 @@ class LsaTable:
         """Counts the changes of `edges`."""
         self.reached: list[int] = []
         """This robot, and those to which a path leads."""
+
+    def number_from(self, first: int) -> None:
+        """Give our next LSA the number after `first`."""
+        self._number = first % LSA_NUMBERS
 
     def __contains__(self, node: int) -> bool:
         return node in self._held
