@@ -14,7 +14,7 @@ import time
 from random import Random
 
 import rclpy
-from rclpy.executors import MultiThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from sdrlink_ros.kinds import kind
@@ -234,10 +234,13 @@ class Agent:
             goal.succeed()
             return Fibonacci.Result(sequence=numbers)
 
+        # A goal that is executed must not hold up that it is cancelled.
+        node = rclpy.create_node(f"{self.node.get_name()}_acting")
         self.action_server = ActionServer(
-            self.node, Fibonacci, name, execute, callback_group=ReentrantCallbackGroup(),
+            node, Fibonacci, name, execute, callback_group=ReentrantCallbackGroup(),
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )  # fmt: skip
+        spin(node, MultiThreadedExecutor(4))
 
     def send_goal(self, name, order):
         """Send a goal, and wait until it is accepted."""
@@ -299,13 +302,17 @@ class Agent:
         return [result.successful, result.reason]
 
 
+def spin(node, executor):
+    """Have `executor` serve `node` in the background."""
+    executor.add_node(node)
+    threading.Thread(target=executor.spin, daemon=True).start()
+
+
 def main():
     rclpy.init()
     agent = Agent(sys.argv[1])
-    executor = MultiThreadedExecutor(4)
-    executor.add_node(agent.node)
-    spinning = threading.Thread(target=executor.spin, daemon=True)
-    spinning.start()
+    # A MultiThreadedExecutor can spin so fast that a thread that publishes waits for seconds.
+    spin(agent.node, SingleThreadedExecutor())
     for line in sys.stdin:
         verb, arguments = json.loads(line)
         try:
