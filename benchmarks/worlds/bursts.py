@@ -236,7 +236,8 @@ class Simulation:
     def _tick(self) -> None:
         for station in self.stations.values():
             link = station.link
-            waits = link.has_work or link.holds_parts
+            # Who relays may await answers.
+            waits = link.has_work or link.holds_parts or link.relays
             if waits or self.now - station.ticked_at >= IDLE_TICK_S:
                 station.ticked_at = self.now
                 link.handle_timers(self.now * station.pace)
