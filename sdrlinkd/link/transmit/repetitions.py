@@ -44,9 +44,11 @@ class Repetitions:
         mcs, n_told = group.mcs, 0 if group.is_relayed or group.announced else 1
         slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1 + n_told), sensed))
         if slot is None and (access.keeps_schedule or access.by_request is not None):
-            # Slots may be made for one PDU, or for faster bursts. A turn is made for what we asked.
+            # Slots may be made for one PDU, or for faster bursts. A turn is made for what we asked,
+            # unless it is the one that each robot has for what is urgent.
             mcs = group.kept[0].mcs
-            least = 1 + n_told if access.by_request is not None else 1
+            is_asked_for = access.by_request is not None and qos is not Qos.URGENT
+            least = 1 + n_told if is_asked_for else 1
             slot = access.slot(Wish(earliest, qos, airtime_s(mcs, least), sensed))
         if slot is None:
             return None
