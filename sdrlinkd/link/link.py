@@ -616,14 +616,14 @@ class Link:
                 self._forward_after_all(waiting)
 
     def _forward(self, event: PduToRelay) -> None:
-        pdu, data, at, until, is_ours_too, number, _, is_bare = event
         refused = self._intake.forward(
-            pdu, data, at, until, number, self._scheduler.bytes_per_s, is_bare=is_bare
-        )
-        if refused and not is_ours_too:
+            event.pdu, event.data, event.at, event.until, event.number,
+            self._scheduler.bytes_per_s, is_bare=event.is_bare,
+        )  # fmt: skip
+        if refused and not event.is_ours_too:
             self._reception.relay_refused()
         if not refused:
-            self._scheduler.forwarding(pdu, at)
+            self._scheduler.forwarding(event.pdu, event.at)
         self._scheduler.more_to_send()
 
     def _forward_after_all(self, event: PduToRelay) -> None:

@@ -66,12 +66,23 @@ class Forwarding:
         if flow is not None:
             flow.heard(seq, hops_left, at)
 
+    def comes_late(self, src: int, dst: int, hops_left: int) -> bool:
+        """Whether who names us for PDUs to one robot may have sent one after we have forwarded it.
+
+        As ours had no fewer hops left, our forwarding was no answer.
+        """
+        flow = self._flows.get((src, dst))
+        return flow is not None and dst != BROADCAST and hops_left >= flow.hops_left
+
     def answered(self, hop: int, need: Need, at: float) -> None:
         """Take a NEED: its sender has heard of all PDUs before the last one that it names."""
         up_to = (max(need.numbers(), default=need.number - 1) + 1) % PDU_NUMBERS
         for flow in self._flows.values():
             if flow.src == need.node:
-                flow.answered(hop, up_to, at, is_named=not any(need.bitmap))
+                # It answers for all PDUs of this source. For those to one robot, whether it knows
+                # that it is named shows when it forwards them.
+                is_named = flow.dst == BROADCAST and not any(need.bitmap)
+                flow.answered(hop, up_to, at, is_named=is_named)
         if at - self.around.get(hop, at) > LEAST_AROUND_S:
             del self.around[hop]
             self._version = -1

@@ -8,9 +8,11 @@ from sdrlinkd.wire import Need, Route, heard_number
 
 LEASE_S = 3.0
 """Time in s for which a ROUTE counts."""
-RECENT_S = 0.5
+RECENT_S = 1.0
 """Time in s for which PDUs are kept that nobody has asked this robot to forward."""
 MOST_RECENT = 512
+LEAST_HOPS = 2
+"""Hops that a PDU has left which may still be forwarded."""
 MOST_NAMED = 1024
 """Most pairs of source and destination."""
 
@@ -19,7 +21,7 @@ Ends = tuple[int, int]
 
 
 class Named:
-    """The ROUTE records that name this robot, and the PDUs of the last half second."""
+    """The ROUTE records that name this robot, and the PDUs of the last second."""
 
     def __init__(self, own_id: int) -> None:
         self._own_id = own_id
@@ -47,6 +49,8 @@ class Named:
             at,
             lambda each: (
                 (each.pdu.src, each.pdu.dst) == ends
+                # What somebody forwarded may still be what this teller sent us.
+                and not (each.is_passed_on and teller == route.src)
                 and (each.number is None or each.number >= heard_number(each.number, route.number))
             ),
         )
@@ -73,6 +77,7 @@ class Named:
             at,
             lambda each: (
                 each.pdu.src == need.node
+                and not each.is_passed_on
                 and each.number in numbers
                 and self.is_named((each.pdu.src, each.pdu.dst), at)
             ),
@@ -88,9 +93,17 @@ class Named:
             del kept[next(iter(kept))]
 
     def forwarded(self, ends: Ends, seq: int, hops_left: int) -> None:
-        """Note that another robot has forwarded a PDU."""
+        """Note that another robot has forwarded a PDU.
+
+        Whoever has, may name this one to forward it next. It did so already if the PDU went on.
+        """
         known = self._spare.get((*ends, seq))
-        if known is not None and hops_left < known.pdu.hop:
+        if known is None or hops_left >= known.pdu.hop:
+            return
+        is_next = hops_left == known.pdu.hop - 1 and hops_left >= LEAST_HOPS
+        if is_next and not known.is_passed_on:
+            self._spare[*ends, seq] = known.passed_on()
+        else:
             del self._spare[*ends, seq]
 
     def expire(self, now: float) -> None:

@@ -8,7 +8,7 @@ from sdrlinkd.link.routes.fixed import FixedRoutes
 from sdrlinkd.link.routes.flow import ANSWER_S
 from sdrlinkd.link.routes.forwarding import Again, Forwarding
 from sdrlinkd.link.routes.links import Links
-from sdrlinkd.link.routes.named import Named
+from sdrlinkd.link.routes.named import LEAST_HOPS, Named
 from sdrlinkd.link.routes.params import RelayParams
 from sdrlinkd.link.routes.to_relay import PduToRelay
 from sdrlinkd.reports import RoutesReport
@@ -112,6 +112,9 @@ class Routes:
             src, dst, seq = raw[SRC], raw[DST], raw[SEQ]
             self._named.forwarded((src, dst), seq, hops_left)
             self._forwarding.forwarded(src, dst, seq, hops_left, at)
+            is_named = src in self._newest and self._named.is_named((src, dst), at)
+            if is_named and self._forwarding.comes_late(src, dst, hops_left):
+                self._owed.setdefault(src, at)
 
     def hear(self, src: int, record: Lsa | Route | Need, at: float) -> list[PduToRelay]:
         """Take a record that robot `src` told directly; returns PDUs that came before, and are to
@@ -218,4 +221,4 @@ class Routes:
 
     def _may(self, pdu: Pdu) -> bool:
         src, dst = pdu.src, pdu.dst
-        return pdu.hop >= 2 and self._own_id not in (src, dst) and src != dst
+        return pdu.hop >= LEAST_HOPS and self._own_id not in (src, dst) and src != dst

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from sdrlinkd.wire import Pdu
+from sdrlinkd.wire import Pdu, delayed, forwarded, is_sealed
 
 
 class PduToRelay(NamedTuple):
@@ -11,6 +11,7 @@ class PduToRelay(NamedTuple):
     Its ages are those at `at`. `is_ours_too`: the PDU is for this robot as well as for others.
     `number` is its PDU number, None if unknown. `is_spare`: it is relayed only if another robot
     names this one for it soon. `is_bare`: it holds only control records, so nobody answers for it.
+    `is_passed_on`: another robot has forwarded it, and this is how that one did.
     """
 
     pdu: Pdu
@@ -21,3 +22,13 @@ class PduToRelay(NamedTuple):
     number: int | None = None
     is_spare: bool = False
     is_bare: bool = False
+    is_passed_on: bool = False
+
+    def passed_on(self) -> "PduToRelay":
+        """The same PDU, with one hop less. Raises ValueError if it has none left."""
+        pdu, data = self.pdu._replace(hop=self.pdu.hop - 1), self.data
+        # Its ages are as they were.
+        data = (
+            delayed(data, 0, hops=1) if is_sealed(data) else forwarded(data, 0, has_control=False)
+        )
+        return self._replace(pdu=pdu, data=data, is_passed_on=True)

@@ -1,0 +1,103 @@
+"""PDUs that are on their way while a route changes: they come, whoever has them already."""
+
+from collections import Counter
+
+from sdrlinkd.link import Overrides
+from sdrlinkd.wire import BROADCAST, DST, HOP, SEQ, SRC, Route
+from tests.link.lossy import PDU_SIZE
+from tests.link.test_routes import AUTO, mesh, of_others
+from tests.link.world import compose, make_link, records_in, tell
+
+HOPS = 6
+FAR = 9
+"""A robot that nobody here hears."""
+
+
+def relay(own_id):
+    return make_link(own_id, relay=AUTO, hop_limit=HOPS, pdu_size=64)
+
+
+def sent_to_far():
+    """The PDU of robot 1 to the far robot."""
+    one = relay(1)
+    one.submit(0, bytes(8), 0.0, Overrides(dst=FAR))
+    (pdu,) = compose(one, 0.0).pdus
+    return pdu
+
+
+def forwarded(link, at):
+    """The hops left in the PDUs of robot 1 that a robot forwards."""
+    burst = compose(link, at)
+    return [pdu[HOP] >> 4 for pdu in burst.pdus if pdu[SRC] == 1] if burst else []
+
+
+def by_two(pdu, at):
+    """The same PDU as robot 2 forwards it."""
+    two = relay(2)
+    tell(two, 1, Route(1, FAR, 0, b"\2"), at=at)
+    two.hear(pdu, at)
+    (copy,) = compose(two, at).pdus
+    return copy
+
+
+def named_late(teller, *, at=0.1, heard_copies=1):
+    """Robot 3, which has heard a PDU from its source, and after that is named for it."""
+    three, pdu = relay(3), sent_to_far()
+    three.hear(pdu, 0.0)
+    tell(three, 1, Route(1, FAR, 0, b"\2"), at=0.01)
+    copy = by_two(pdu, 0.02)
+    for i in range(heard_copies):
+        three.hear(copy, 0.02 + i / 1000)
+    tell(three, teller, Route(1, FAR, 0, b"\3"), at=at)
+    return three
+
+
+def test_a_robot_that_has_a_pdu_from_its_source_forwards_it_for_the_relay_that_comes_next():
+    """It also heard the relay forward it, and must not take that for its own part."""
+    assert forwarded(named_late(teller=2), 0.2) == [HOPS - 2]
+    assert forwarded(named_late(teller=2, heard_copies=0), 0.2) == [HOPS - 1]
+
+
+def test_what_another_robot_forwarded_for_the_source_is_not_forwarded_again():
+    assert forwarded(named_late(teller=1), 0.2) == []
+    assert forwarded(named_late(teller=1, heard_copies=0), 0.2) == [HOPS - 1]
+
+
+def test_pdus_of_the_last_second_are_forwarded_after_all():
+    assert forwarded(named_late(teller=2, at=0.8), 0.85) == [HOPS - 2]
+    assert forwarded(named_late(teller=2, at=1.1), 1.15) == []
+
+
+def test_who_forwards_before_its_teller_answers_all_the_same():
+    """Robot 3 hears robot 1, which does not hear it. Its copies have as many hops as those of 2."""
+    air = mesh((1, 2), (2, 3), (3, 4))
+    air.hears |= {(3, 1)}
+    air.run(3.0)
+    for number in range(40):
+        air.flow(1, 1, every_s=0.05, first=number, overrides=Overrides(dst=4))
+        assert air.links[2].report(air.now).routes.going_around == []
+    air.run(air.now + 0.5)
+    assert air.numbers(4) == list(range(40))
+    copies = Counter(pdu[SEQ] for pdu in of_others(air, 2) if pdu[DST] == 4)
+    assert max(copies.values()) == 1
+
+
+def test_a_robot_that_answers_for_others_may_still_not_know_that_it_is_named():
+    """Robots 2 and 4 answer for what is for everyone, and that for all PDUs of robot 1."""
+    left = [1]
+
+    def lost(to, src, _n, pdu):
+        is_first = (to, src) == (2, 1) and any(
+            isinstance(each, Route) and each.dst == 3 for each in records_in(pdu, PDU_SIZE)
+        )
+        return is_first and bool(left and left.pop())
+
+    air = mesh((1, 2), (2, 3), (1, 4), (4, 5), lost=lost)
+    air.run(3.0)
+    air.flow(1, 10)
+    for number in range(10, 50):
+        dst = 3 if number % 2 else BROADCAST
+        air.flow(1, 1, first=number, overrides=Overrides(dst=dst))
+    air.run(air.now + 0.4)
+    assert not left
+    assert sorted(air.numbers(3)) == list(range(50))
