@@ -242,10 +242,8 @@ ROWS = {
 # Benchmarks whose rows are all exact, and those that have others as well.
 ALL_EXACT = {"access", "phy_per", "repeats", "team", "timesync"}
 SOME_EXACT = {"latency", "pound", "sealing"}
-# Exact rows that miss their targets, and are shown so: see tests/benchmarks_pound/test_lockstep.py
-# and tests/test_team.py.
+# Exact rows that miss their targets, and are shown so: see tests/benchmarks_pound/test_lockstep.py.
 MISSED = {
-    "team": {f"mobile_8_mdr_{qos}" for qos in ("urgent", "latency", "default")},
     "pound": {
         "image_1ch_stdD_ms", "rlc_rms_vs_local_mV", "laser_1ch_defaults_D_ms",
         *(f"image_1ch_defaults_{each}" for each in ("D_ms", "stdD_ms", "mdr_pct")),

@@ -52,13 +52,13 @@ def test_images_survive_four_hops_that_lose_pdus():
 
 
 @pytest.mark.slow
-def test_robots_that_drive_lose_little_while_there_is_a_path():
-    """Some are lost where a team falls in two, or comes together: see docs/limits.md."""
+def test_robots_that_drive_lose_next_to_nothing_while_there_is_a_path():
+    """A few are lost where a team falls in two, or comes together: see docs/limits.md."""
     found = drive("grant", 1, 30.0)
     assert found.hops > 1.5
-    for qos, least in (("urgent", 0.95), ("latency", 0.98), ("default", 0.95)):
+    for qos, least in (("urgent", 0.9999), ("latency", 0.999), ("default", 0.99)):
         assert found.sent[qos] > 100
-        assert found.mdr(qos) > least
+        assert found.mdr(qos) >= least
 
 
 @pytest.mark.slow
