@@ -200,6 +200,41 @@ def test_a_robot_that_has_gone_is_not_one_that_others_do_not_hear():
         assert "do not hear" not in access.state
 
 
+def busy(access, since, until, sources=(2, 3)):
+    """Let robots be heard all the time; returns when others were first said not to hear each other,
+    or None.
+    """
+    for i in range(round(50 * (until - since))):
+        now = since + i / 50
+        for src in sources:
+            access.heard(src, now, False)
+            access.beacon(src, now)
+        if "do not hear" in access.state:
+            return now
+    return None
+
+
+@pytest.mark.parametrize("sources", [(2,), ()])
+def test_a_pause_of_a_robot_or_of_ours_is_not_deafness(sources):
+    """LSAs told that 2 and 3 do not hear each other, and robot 3, or all, were silent for 1 s."""
+    access, _ = access_with()
+    assert busy(access, 10.0, 15.0) is None
+    access.know_links(APART)
+    assert busy(access, 15.0, 15.1) is None
+    assert busy(access, 15.1, 16.0, sources) is None
+    assert 17.5 <= busy(access, 16.0, 20.0) < 17.6
+
+
+def test_a_report_of_what_was_heard_long_ago_is_not_believed():
+    """The LSA of robot 2 denies that it hears robot 3, which has gone."""
+    access, _ = access_with()
+    assert busy(access, 10.0, 15.0) is None
+    access.know_links(APART)
+    for i in range(8):
+        assert busy(access, 15.0 + i / 2, 15.5 + i / 2, (2,)) is None
+        access.told_of(3, 15.5 + i / 2, 2)
+
+
 octet, times = st.integers(0, 255), st.floats(-1, 3)
 whatever = st.one_of(
     told_events,

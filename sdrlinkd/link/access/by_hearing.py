@@ -128,7 +128,7 @@ class ByHearing(BusyChannel):
         """Note that robot `by` hears robot `node`."""
         self._grants.told_of(node, at, by, is_weak=is_weak)
         if not is_weak:
-            self._hearing.told_of(node, at)
+            self._hearing.told_of(node, at, by)
 
     def know_links(self, edges: Edges) -> None:
         """Take the links of the team, as its LSAs tell them."""

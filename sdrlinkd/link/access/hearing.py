@@ -1,6 +1,7 @@
 """Whether all robots of the team that are here hear each other, as LSAs tell it."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from math import inf
 
@@ -15,10 +16,30 @@ DEAF_COST = 1e4
 """Cost of a link on which next to nothing arrives."""
 UNHEARD_S = PRESENT_S
 """Time in s for which others must have told of a robot that we do not hear, if LSAs do not tell."""
-GONE_S = 2.2
-"""Time in s after which a robot of which nothing was heard begins anew."""
+GONE_GAPS, LEAST_GONE_S, MOST_GONE_S = 2.2, 0.8, 2.2
+"""A robot of which nothing was heard for so many of its usual gaps, within these limits in s, was
+away, and begins anew. So does this one if it has heard nobody."""
+FIRST_GAP_S = 1.0
+GAP_DECAY = 0.98
 
 Pair = tuple[int, int]
+
+
+@dataclass(slots=True)
+class _Sight:
+    """When a robot was seen last, by anybody; since when it is here, and its longest usual gap."""
+
+    at: float
+    came_at: float
+    gap_s: float = FIRST_GAP_S
+
+    def again(self, at: float) -> None:
+        gap_s = at - self.at
+        if gap_s > min(max(GONE_GAPS * self.gap_s, LEAST_GONE_S), MOST_GONE_S):
+            self.came_at = at
+        else:
+            self.gap_s = max(gap_s, GAP_DECAY * self.gap_s)
+        self.at = max(at, self.at)
 
 
 class Hearing:
@@ -27,9 +48,8 @@ class Hearing:
     def __init__(self, own_id: int, nodes: Sequence[int]) -> None:
         self._own_id = own_id
         self._nodes = frozenset(nodes)
-        self._came_at: dict[int, float] = {}
-        self._seen_at: dict[int, float] = {}
-        """When we or somebody else heard each robot."""
+        self._seen: dict[int, _Sight] = {}
+        """When we or somebody else heard each robot; for this one, when it heard anybody."""
         self._heard_at: dict[int, float] = {}
         self._edges: Edges = {}
         self._poor_since: dict[Pair, float] = {}
@@ -42,15 +62,14 @@ class Hearing:
     def heard(self, node: int, at: float) -> None:
         """Note that we hear a robot."""
         self._heard_at[node] = at
-        self.told_of(node, at)
+        self._see(self._own_id, at)
+        self._see(node, at)
 
-    def told_of(self, node: int, at: float) -> None:
-        """Note that somebody hears a robot."""
-        if node in self._nodes and node != self._own_id:
-            seen_at = self._seen_at.get(node, -inf)
-            if at > seen_at + GONE_S:
-                self._came_at[node] = at
-            self._seen_at[node] = max(at, seen_at)
+    def told_of(self, node: int, at: float, by: int) -> None:
+        """Note that robot `by` says that it hears a robot; what its LSA denies, was long ago."""
+        links = self._edges.get(by)
+        if node != self._own_id and (not links or node in links):
+            self._see(node, at)
 
     def learn(self, edges: Edges) -> None:
         """Take the links that LSAs tell."""
@@ -58,9 +77,9 @@ class Hearing:
 
     def apart(self, now: float) -> Pair | None:
         """Two robots that are here and do not hear each other; None: all hear all."""
-        here = [node for node, at in self._seen_at.items() if at > now - PRESENT_S]
+        here = {node for node, seen in self._seen.items() if seen.at > now - PRESENT_S}
         found, poor, deaf = None, dict[Pair, float](), dict[Pair, float]()
-        for pair in combinations(sorted([self._own_id, *here]), 2):
+        for pair in combinations(sorted({self._own_id, *here}), 2):
             cost = self._cost(pair)
             if cost is None:
                 if self._is_unheard(pair):
@@ -93,7 +112,14 @@ class Hearing:
         return self._were_here(pair, self._heard_at.get(other, -inf), UNHEARD_S)
 
     def _were_here(self, pair: Pair, since: float, for_s: float) -> bool:
-        """Whether two robots were here for so long after `since`."""
-        others = [node for node in pair if node != self._own_id]
-        since = max(since, *(self._came_at[node] for node in others))
-        return min(self._seen_at[node] for node in others) > since + for_s
+        """Whether two robots, and this one, were here for so long after `since`."""
+        seen = [self._seen[node] for node in {*pair, self._own_id} if node in self._seen]
+        since = max(since, *(each.came_at for each in seen))
+        return min(each.at for each in seen) > since + for_s
+
+    def _see(self, node: int, at: float) -> None:
+        seen = self._seen.get(node)
+        if seen is not None:
+            seen.again(at)
+        elif node in self._nodes:
+            self._seen[node] = _Sight(at, at)
