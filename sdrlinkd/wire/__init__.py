@@ -187,6 +187,7 @@ from sdrlinkd.wire.sealed import (
     is_sealed,
     leaves_later,
     parse_sealed,
+    relayed,
 )
 
 __all__ = [
@@ -356,6 +357,7 @@ __all__ = [
     "pieces",
     "postponed",
     "read_control_entries",
+    "relayed",
     "share_of",
     "tellable",
     "topic_type",

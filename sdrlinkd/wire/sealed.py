@@ -8,7 +8,7 @@ from sdrlinkd.errors import PduError
 from sdrlinkd.wire.builder import FLAG_SEALED, VERSION
 from sdrlinkd.wire.capacity import CRC_SIZE, HEADER_SIZE, MIN_PDU_SIZE
 from sdrlinkd.wire.crc import crc16
-from sdrlinkd.wire.later import HOP, postponed
+from sdrlinkd.wire.later import HOP, forwarded, postponed
 
 TAG_SIZE = 8
 SEAL_OVERHEAD = 14
@@ -129,6 +129,14 @@ def delayed(data: bytes, by_us: int, hops: int = 0) -> bytes:
     _HELD.pack_into(changed, _NUMBER_END, min(later, MAX_HELD))
     body = bytes(changed[:-CRC_SIZE])
     return body + _CRC.pack(crc16(body))
+
+
+def relayed(pdu: bytes, by_us: int, has_control: bool) -> bytes:
+    """Another robot's PDU with one hop less, which leaves `by_us` µs after the burst it came in.
+
+    Raises ValueError if it has no hop left.
+    """
+    return delayed(pdu, by_us, hops=1) if is_sealed(pdu) else forwarded(pdu, by_us, has_control)
 
 
 def leaves_later(pdu: bytes, by_us: int) -> bytes:

@@ -31,23 +31,25 @@ def forwarded(link, at):
     return [pdu[HOP] >> 4 for pdu in burst.pdus if pdu[SRC] == 1] if burst else []
 
 
-def by_two(pdu, at):
-    """The same PDU as robot 2 forwards it."""
-    two = relay(2)
-    tell(two, 1, Route(1, FAR, 0, b"\2"), at=at)
-    two.hear(pdu, at)
-    (copy,) = compose(two, at).pdus
+def by(robot, pdu, at):
+    """The same PDU as another robot forwards it."""
+    link = relay(robot)
+    tell(link, 1, Route(1, FAR, 0, bytes((robot,))), at=at)
+    link.hear(pdu, at)
+    (copy,) = compose(link, at).pdus
     return copy
 
 
-def named_late(teller, *, at=0.1, heard_copies=1):
-    """Robot 3, which has heard a PDU from its source, and after that is named for it."""
+def named_late(teller, *, at=0.1, forwarded_by=(2,)):
+    """Robot 3, which heard a PDU from its source, and those who forwarded it in turn, and is named
+    for it after that.
+    """
     three, pdu = relay(3), sent_to_far()
     three.hear(pdu, 0.0)
     tell(three, 1, Route(1, FAR, 0, b"\2"), at=0.01)
-    copy = by_two(pdu, 0.02)
-    for i in range(heard_copies):
-        three.hear(copy, 0.02 + i / 1000)
+    for robot in forwarded_by:
+        pdu = by(robot, pdu, 0.02)
+        three.hear(pdu, 0.02)
     tell(three, teller, Route(1, FAR, 0, b"\3"), at=at)
     return three
 
@@ -55,12 +57,16 @@ def named_late(teller, *, at=0.1, heard_copies=1):
 def test_a_robot_that_has_a_pdu_from_its_source_forwards_it_for_the_relay_that_comes_next():
     """It also heard the relay forward it, and must not take that for its own part."""
     assert forwarded(named_late(teller=2), 0.2) == [HOPS - 2]
-    assert forwarded(named_late(teller=2, heard_copies=0), 0.2) == [HOPS - 1]
+    assert forwarded(named_late(teller=2, forwarded_by=()), 0.2) == [HOPS - 1]
 
 
 def test_what_another_robot_forwarded_for_the_source_is_not_forwarded_again():
     assert forwarded(named_late(teller=1), 0.2) == []
-    assert forwarded(named_late(teller=1, heard_copies=0), 0.2) == [HOPS - 1]
+    assert forwarded(named_late(teller=1, forwarded_by=()), 0.2) == [HOPS - 1]
+
+
+def test_what_went_on_from_the_relay_is_not_forwarded_again():
+    assert forwarded(named_late(teller=2, forwarded_by=(2, 4)), 0.2) == []
 
 
 def test_pdus_of_the_last_second_are_forwarded_after_all():
@@ -83,7 +89,7 @@ def test_who_forwards_before_its_teller_answers_all_the_same():
 
 
 def test_a_robot_that_answers_for_others_may_still_not_know_that_it_is_named():
-    """Robots 2 and 4 answer for what is for everyone, and that for all PDUs of robot 1."""
+    """Robots 2 and 4 answer for PDUs to everyone, and with that for all PDUs of robot 1."""
     left = [1]
 
     def lost(to, src, _n, pdu):

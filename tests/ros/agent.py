@@ -234,7 +234,7 @@ class Agent:
             goal.succeed()
             return Fibonacci.Result(sequence=numbers)
 
-        # A goal that is executed must not hold up that it is cancelled.
+        # A goal can be cancelled while it is executed.
         node = rclpy.create_node(f"{self.node.get_name()}_acting")
         self.action_server = ActionServer(
             node, Fibonacci, name, execute, callback_group=ReentrantCallbackGroup(),

@@ -7,6 +7,7 @@ from math import inf
 
 from sdrlinkd.link.access.team import DOUBTFUL, PRESENT_S
 from sdrlinkd.link.paths import Edges
+from sdrlinkd.link.pauses import usual_gap
 
 DEAF_S, POOR_S = 1.5, 5.0
 """Time in s for which two robots must have been here, and have told nothing of each other, or that
@@ -20,7 +21,6 @@ GONE_GAPS, LEAST_GONE_S, MOST_GONE_S = 2.2, 0.8, 2.2
 """A robot of which nothing was heard for so many of its usual gaps, within these limits in s, was
 away, and begins anew. So does this one if it has heard nobody."""
 FIRST_GAP_S = 1.0
-GAP_DECAY = 0.98
 
 Pair = tuple[int, int]
 
@@ -38,7 +38,7 @@ class _Sight:
         if gap_s > min(max(GONE_GAPS * self.gap_s, LEAST_GONE_S), MOST_GONE_S):
             self.came_at = at
         else:
-            self.gap_s = max(gap_s, GAP_DECAY * self.gap_s)
+            self.gap_s = usual_gap(gap_s, self.gap_s)
         self.at = max(at, self.at)
 
 

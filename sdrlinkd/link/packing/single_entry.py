@@ -4,7 +4,7 @@ from sdrlinkd.link.packing.draft import BuiltPdu
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import WIRE_BITS
 from sdrlinkd.link.queue import Lane, Outbox, Outgoing
-from sdrlinkd.wire import build_full, delayed, equal_payload, flags, forwarded, is_sealed
+from sdrlinkd.wire import build_full, equal_payload, flags, relayed
 
 
 class SingleEntry:
@@ -28,10 +28,7 @@ class SingleEntry:
 
     def forwarded(self, pdu: bytes, held_s: float) -> bytes:
         """Another robot's PDU, which came `held_s` before, with one hop less."""
-        held_us = max(0, round(1e6 * held_s))
-        if is_sealed(pdu):
-            return delayed(pdu, held_us, hops=1)
-        return forwarded(pdu, held_us, self._has_control)
+        return relayed(pdu, max(0, round(1e6 * held_s)), self._has_control)
 
     def fills_some(self, head: Outgoing) -> bool:
         """Whether the next fragment of `head` fills a PDU and is not the last one."""

@@ -3,13 +3,13 @@
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
 
+from sdrlinkd.link.pauses import usual_gap
 from sdrlinkd.link.receive.duplicates import SequenceTrack
 from sdrlinkd.reports import NeighborReport
 from sdrlinkd.wire import Registry, RegistryDigest
 
 # Weight of the newest PDU in the mean SNR.
 SNR_WEIGHT = 0.2
-GAP_DECAY = 0.98
 LONGEST_GAP_S = 16.0
 """Longest pause in s that counts: an idle half-duplex robot is heard at least this often."""
 PRESENT_S = 10.0
@@ -43,9 +43,9 @@ class Neighbor:
     def heard_at(self, at: float) -> None:
         """Note the time of one more PDU."""
         if self.last_heard_at:
-            # A long pause decays over some hundred PDUs; an outage does not count as a pause.
+            # An outage does not count as a pause.
             gap_s = min(at - self.last_heard_at, LONGEST_GAP_S)
-            self.usual_gap_s = max(gap_s, GAP_DECAY * self.usual_gap_s)
+            self.usual_gap_s = usual_gap(gap_s, self.usual_gap_s)
         self.last_heard_at = at
 
     def count_new(self, hops_left: int, *, is_repaired: bool = False) -> None:

@@ -67,9 +67,9 @@ class Forwarding:
             flow.heard(seq, hops_left, at)
 
     def comes_late(self, src: int, dst: int, hops_left: int) -> bool:
-        """Whether who names us for PDUs to one robot may have sent one after we have forwarded it.
+        """Whether a copy may be from a robot that names us, sent after we had forwarded the PDU.
 
-        As ours had no fewer hops left, our forwarding was no answer.
+        Ours had as many hops left, or more, so it was no answer to that robot.
         """
         flow = self._flows.get((src, dst))
         return flow is not None and dst != BROADCAST and hops_left >= flow.hops_left

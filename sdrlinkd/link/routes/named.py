@@ -12,7 +12,7 @@ RECENT_S = 1.0
 """Time in s for which PDUs are kept that nobody has asked this robot to forward."""
 MOST_RECENT = 512
 LEAST_HOPS = 2
-"""Hops that a PDU has left which may still be forwarded."""
+"""Fewest hops left in a PDU that is still forwarded."""
 MOST_NAMED = 1024
 """Most pairs of source and destination."""
 
@@ -49,7 +49,7 @@ class Named:
             at,
             lambda each: (
                 (each.pdu.src, each.pdu.dst) == ends
-                # What somebody forwarded may still be what this teller sent us.
+                # Another teller than the source may itself be who has forwarded it.
                 and not (each.is_passed_on and teller == route.src)
                 and (each.number is None or each.number >= heard_number(each.number, route.number))
             ),
@@ -95,7 +95,8 @@ class Named:
     def forwarded(self, ends: Ends, seq: int, hops_left: int) -> None:
         """Note that another robot has forwarded a PDU.
 
-        Whoever has, may name this one to forward it next. It did so already if the PDU went on.
+        That robot may yet name this one as the next. Where the PDU went on from there, it named
+        somebody else.
         """
         known = self._spare.get((*ends, seq))
         if known is None or hops_left >= known.pdu.hop:

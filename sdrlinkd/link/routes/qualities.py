@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import exp
 
 from sdrlinkd.link.paths import HALF_BELOW_DB
+from sdrlinkd.link.pauses import usual_gap
 from sdrlinkd.wire import loss_of
 
 MEMORY_S = 2.0
@@ -17,7 +18,6 @@ CLIFF_DB = 0.25
 MOST_STEP = 64
 """Most PDUs that one silence counts for."""
 FIRST_GAP_S = 1.0
-GAP_DECAY = 0.98
 SILENT_GAPS = 3
 LEAST_SILENCE_S, MOST_SILENCE_S = 0.2, 10.0
 """A robot is not heard any more after three of its usual gaps, within these limits in s."""
@@ -72,7 +72,7 @@ class Qualities:
             gap_s = min(max(0.0, at - heard.direct_at), MOST_SILENCE_S)
             if gap_s > 0:
                 # The PDUs of a burst came together.
-                heard.gap_s = max(gap_s, GAP_DECAY * heard.gap_s)
+                heard.gap_s = usual_gap(gap_s, heard.gap_s)
             heard.direct_at = max(at, heard.direct_at)
             heard.snr_db = snr_db
 

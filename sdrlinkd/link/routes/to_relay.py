@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from sdrlinkd.wire import Pdu, delayed, forwarded, is_sealed
+from sdrlinkd.wire import HOP, Pdu, relayed
 
 
 class PduToRelay(NamedTuple):
@@ -26,9 +26,7 @@ class PduToRelay(NamedTuple):
 
     def passed_on(self) -> "PduToRelay":
         """The same PDU, with one hop less. Raises ValueError if it has none left."""
-        pdu, data = self.pdu._replace(hop=self.pdu.hop - 1), self.data
-        # Its ages are as they were.
-        data = (
-            delayed(data, 0, hops=1) if is_sealed(data) else forwarded(data, 0, has_control=False)
-        )
+        # Its ages are still those at `at`.
+        data = relayed(self.data, 0, has_control=False)
+        pdu = self.pdu._replace(hop=data[HOP] >> 4)
         return self._replace(pdu=pdu, data=data, is_passed_on=True)
