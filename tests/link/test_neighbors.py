@@ -4,6 +4,7 @@ from sdrlinkd.link import Overrides
 from sdrlinkd.link.receive import LONGEST_GAP_S, Neighbor
 from sdrlinkd.wire import LinkReport
 from tests.link.test_routes import mesh
+from tests.link.world import compose, make_link, records_in
 
 
 def heard(neighbor, times):
@@ -39,3 +40,24 @@ def test_a_robot_that_is_heard_through_relays_only_is_not_reported():
     assert any(each.node == 3 and at < 3 for at, each in reports)
     assert {each.node for at, each in reports if at > left_at} == {2}
     assert len(set(air.numbers(1))) == 200
+
+
+def test_a_robot_that_could_not_send_does_not_report_who_was_here_before():
+    """Otherwise one that has left would seem to be back."""
+    link, other = make_link(1, beacon_s=1.0), make_link(2, beacon_s=1.0)
+
+    def reported(at):
+        burst = compose(link, at)
+        records = [each for pdu in burst.pdus for each in records_in(pdu, link.params.pdu_size)]
+        return [each.node for each in records if isinstance(each, LinkReport)]
+
+    def hear(at):
+        for pdu in compose(other, at).pdus:
+            link.hear(pdu, at, 20.0)
+
+    hear(0.0)
+    assert reported(0.5) == [2]
+    hear(1.5)
+    assert reported(20.0) == []
+    hear(20.5)
+    assert reported(21.5) == [2]

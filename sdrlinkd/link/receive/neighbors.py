@@ -2,6 +2,7 @@
 
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
+from math import inf
 
 from sdrlinkd.link.pauses import usual_gap
 from sdrlinkd.link.receive.duplicates import SequenceTrack
@@ -32,8 +33,8 @@ class Neighbor:
     hops_left: int = 0
     snr_db: float | None = None
     mean_snr_db: float | None = None
-    is_direct: bool = False
-    """Whether a PDU has come directly since the last report."""
+    direct_at: float = -inf
+    """When the last PDU since the last report came directly."""
     boot_id: int | None = None
     _strange_boot_id: int | None = None
     reboots: int = 0
@@ -59,16 +60,17 @@ class Neighbor:
         self.duplicates += 1
 
     def note_snr(self, snr_db: float | None) -> None:
-        """Note the SNR of one more PDU that came directly, in dB."""
-        self.is_direct = True
+        """Note the SNR of the newest PDU, which came directly, in dB."""
+        self.direct_at = self.last_heard_at
         self.snr_db = snr_db
         if snr_db is None or self.mean_snr_db is None:
             self.mean_snr_db = snr_db
         else:
             self.mean_snr_db += SNR_WEIGHT * (snr_db - self.mean_snr_db)
 
-    def take_quality(self) -> tuple[float, float] | None:
-        """(mean SNR in dB, share of PDUs lost since the last call); None if nothing came directly.
+    def take_quality(self, since: float) -> tuple[float, float] | None:
+        """(mean SNR in dB, share of PDUs lost since the last call); None if nothing came directly
+        since then, and since `since`.
 
         What was repeated counts as lost, too.
         """
@@ -76,8 +78,8 @@ class Neighbor:
         first_heard = self.heard - self.repaired
         heard = first_heard - self._reported[0]
         lost = max(0, missed - self._reported[1])
-        is_direct, self.is_direct = self.is_direct, False
-        if heard <= 0 or not is_direct or self.mean_snr_db is None:
+        direct_at, self.direct_at = self.direct_at, -inf
+        if heard <= 0 or direct_at < since or self.mean_snr_db is None:
             return None
         self._reported = (first_heard, missed)
         return self.mean_snr_db, lost / (heard + lost)
@@ -146,13 +148,14 @@ class Neighbors:
             if each.src != self._own_id and now - each.last_heard_at < PRESENT_S
         ]
 
-    def take_qualities(self) -> Iterator[tuple[int, float, float]]:
-        """(robot, mean SNR in dB, share of its PDUs lost) of the others heard since the last call.
+    def take_qualities(self, since: float) -> Iterator[tuple[int, float, float]]:
+        """(robot, mean SNR in dB, share of its PDUs lost) of the others heard directly since the
+        last call, and since `since`.
 
         A robot's counts start anew only when the iterator reaches it.
         """
         for each in self:
-            quality = each.take_quality() if each.src != self._own_id else None
+            quality = each.take_quality(since) if each.src != self._own_id else None
             if quality is not None:
                 yield each.src, *quality
 

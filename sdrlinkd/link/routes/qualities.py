@@ -21,6 +21,12 @@ FIRST_GAP_S = 1.0
 SILENT_GAPS = 3
 LEAST_SILENCE_S, MOST_SILENCE_S = 0.2, 10.0
 """A robot is not heard any more after three of its usual gaps, within these limits in s."""
+LEAST_PAUSE_S = 1.0
+"""If nothing of a robot came by any way for three of its usual gaps, and for so long in s, it or
+this robot was away."""
+CLEAR_DB = 4.0
+"""Least margin of the SNR in dB with which what was missed in a pause says nothing about the link.
+A robot at the edge of range comes and goes."""
 CHANGED = 4
 """Change of a loss that is told."""
 
@@ -59,20 +65,22 @@ class Qualities:
             if is_direct:
                 self._heard[src] = _Heard(number, at, at, snr_db=snr_db)
             return
+        was_away = at - heard.at > max(LEAST_PAUSE_S, _silence_s(heard))
+        is_clear = self._is_clear(snr_db if is_direct else heard.snr_db)
         fade = exp(min(0.0, heard.at - at) / MEMORY_S)
         heard.expected *= fade
         heard.arrived *= fade
         heard.at = max(at, heard.at)
         step = number - heard.newest
         if step > 0:
-            heard.expected += min(step, MOST_STEP)
+            heard.expected += 1 if was_away and is_clear else min(step, MOST_STEP)
             heard.newest = number
         if is_direct:
             heard.arrived += 1
             gap_s = min(max(0.0, at - heard.direct_at), MOST_SILENCE_S)
             if gap_s > 0:
-                # The PDUs of a burst came together.
-                heard.gap_s = usual_gap(gap_s, heard.gap_s)
+                # The PDUs of a burst came together. A single pause is not usual.
+                heard.gap_s = usual_gap(min(gap_s, _silence_s(heard)), heard.gap_s)
             heard.direct_at = max(at, heard.direct_at)
             heard.snr_db = snr_db
 
@@ -89,8 +97,7 @@ class Qualities:
         heard = self._heard.get(src)
         if heard is None:
             return False
-        silent_s = min(max(SILENT_GAPS * heard.gap_s, LEAST_SILENCE_S), MOST_SILENCE_S)
-        return now - heard.direct_at <= silent_s
+        return now - heard.direct_at <= _silence_s(heard)
 
     def losses(self, now: float) -> dict[int, int]:
         """The losses to be told at `now`, by robot; small changes are not told."""
@@ -105,6 +112,9 @@ class Qualities:
             found[src] = heard.told
         return found
 
+    def _is_clear(self, snr_db: float | None) -> bool:
+        return snr_db is not None and snr_db >= self._needed_db + CLEAR_DB
+
     def _loss(self, heard: _Heard) -> int:
         usual = most = 1.0
         if heard.snr_db is not None:
@@ -114,3 +124,8 @@ class Qualities:
             most = 1 / (1 + 2 ** ((below_db - HALF_BELOW_DB) / CLIFF_DB))
         expected = max(heard.expected, heard.arrived)
         return loss_of(min(most, (heard.arrived + PRIOR * usual) / (expected + PRIOR)))
+
+
+def _silence_s(heard: _Heard) -> float:
+    """The time in s after which a robot is not heard any more."""
+    return min(max(SILENT_GAPS * heard.gap_s, LEAST_SILENCE_S), MOST_SILENCE_S)

@@ -9,6 +9,8 @@ from sdrlinkd.wire import Beacon, LinkReport, Record, RegistryDigest, build_reco
 
 # Keeps the beacons of robots that started together from colliding forever.
 JITTER = 0.1
+REPORTED_PERIODS = 2
+"""Robots that were heard within so many periods are reported; we may have sent nothing for long."""
 SNR_RANGE = (-128, 127)
 
 
@@ -40,7 +42,8 @@ class Beacons:
         records: list[Record] = [Beacon(self.boot_id, self._number, self._told), self._digest]
         self._number = (self._number + 1) & 0xFFFF
         self.due_at = start + self._period_s * self._rng.uniform(1 - JITTER, 1 + JITTER)
-        for src, snr_db, per in neighbors.take_qualities():
+        since = start - REPORTED_PERIODS * self._period_s
+        for src, snr_db, per in neighbors.take_qualities(since):
             low, high = SNR_RANGE
             quarters = min(max(round(4 * snr_db), low), high)
             records.append(LinkReport(src, quarters, round(255 * per), rate.suggested(snr_db)))
