@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.link import Overrides, RelayParams
+from sdrlinkd.link import ClockParams, Overrides, RelayParams
 from sdrlinkd.link.routes import path, tree
 from sdrlinkd.wire import BROADCAST, Lsa, Need, Route, parse
 from tests.laws import law
-from tests.link.lossy import Air
+from tests.link.lossy import Air, carries
 from tests.link.world import compose, make_link, rx, tell
 
 AUTO = RelayParams(policy="auto")
@@ -255,3 +255,21 @@ def test_tables_are_bounded_whatever_is_told():
     report = link.report(3.0).routes
     assert len(report.robots) <= 32
     assert link.audit() == []
+
+
+@pytest.mark.parametrize("pairs", [[(1, 2)], [(1, 3), (3, 2)]])
+def test_the_first_pdu_of_a_flow_is_repeated_if_nobody_answers(pairs):
+    """A single message is a flow of one PDU, and nothing after it shows that it is missing."""
+    gone = []
+
+    def lost(_to, src, _n, pdu):
+        is_first = src == 1 and carries(77)(pdu) and len(gone) < 1
+        gone.extend([pdu] * is_first)
+        return is_first
+
+    air = mesh(*pairs, lost=lost, clock=ClockParams(period_s=0.0), beacon_s=4.0)
+    air.run(5.0)
+    air.submit(1, 77, overrides=Overrides(dst=2))
+    air.run(air.now + 0.6)
+    assert gone
+    assert air.numbers(2) == [77]

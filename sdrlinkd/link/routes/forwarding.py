@@ -53,12 +53,11 @@ class Forwarding:
         `is_bare`: it holds only control records, and nobody answers for it.
         """
         flow = self._flows.get((src, dst))
-        is_new = flow is None
         if flow is None:
-            flow = self._flows[src, dst] = Flow(src, dst)
-        flow.sent(number, hops_left, at, is_bare=is_bare)
-        if is_new:
+            # Its first PDU is answered, too.
+            flow = self._flows[src, dst] = Flow(src, dst, number)
             self._reroute(flow, at)
+        flow.sent(number, hops_left, at, is_bare=is_bare)
 
     def forwarded(self, src: int, dst: int, seq: int, hops_left: int, at: float) -> None:
         """Note that a PDU came from another robot than its source."""
@@ -123,7 +122,7 @@ class Forwarding:
         self.around.clear()
         self.has_news = False
         # There is always something for everyone, such as declarations.
-        self._flows[self._own_id, BROADCAST] = Flow(self._own_id, BROADCAST)
+        self._flows[self._own_id, BROADCAST] = Flow(self._own_id, BROADCAST, 0)
 
     def report(self, now: float) -> list[FlowReport]:
         """Who forwards what next, as far as somebody does."""
