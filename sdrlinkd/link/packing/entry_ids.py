@@ -131,12 +131,18 @@ class TopicEntryIds:
 
     def next_free_of(self, levels: Iterable[Level]) -> float:
         """Time at which a message of any level may begin or go on; −inf: now."""
-        return min(
-            self.next_free(head) if lane.current is None or head.needs_id else float("-inf")
-            for level in levels
-            for lane in level.lanes
-            if (head := lane.head) is not None
-        )
+        soonest = float("inf")
+        for level in levels:
+            for lane in level.lanes:
+                head = lane.head
+                if head is None:
+                    continue
+                needs_id = lane.current is None or head.needs_id
+                free_at = self.next_free(head) if needs_id else float("-inf")
+                if free_at == float("-inf"):
+                    return free_at
+                soonest = min(soonest, free_at)
+        return soonest
 
     def _new(self, topic_id: int) -> EntryIds:
         ids = self._by_topic[topic_id] = EntryIds(self._rng, self._rest_s)

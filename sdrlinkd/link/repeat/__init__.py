@@ -7,7 +7,7 @@ to ask and what to repeat, and when. It sends nothing itself: bursts and records
 
 from sdrlinkd.link.repeat.answers import Answers
 from sdrlinkd.link.repeat.asking import Asking
-from sdrlinkd.link.repeat.group import RepeatGroup
+from sdrlinkd.link.repeat.group import RepeatGroup, Wanted
 from sdrlinkd.link.repeat.kept import Kept
 from sdrlinkd.link.repeat.params import RepeatParams
 
@@ -17,4 +17,5 @@ __all__ = [
     "Kept",
     "RepeatGroup",
     "RepeatParams",
+    "Wanted",
 ]

@@ -156,36 +156,39 @@ class Answers:
         asked_at = min((e.due_at for e in self.wanted.values() if e.askers), default=inf)
         return min(twice_at, max(asked_at, self._budget.free_at(now)))
 
-    def due_class(self, start: float, next_number: int) -> Qos | None:
-        """The most urgent class of the PDUs that may be repeated at `start`; None: there are none.
+    def due(self, start: float, next_number: int) -> list[Wanted]:
+        """The PDUs that may be repeated at `start`, as far as they are of their most urgent class.
 
         What has expired by then is dropped. Our next PDU has `next_number`.
         """
         self._next_number = next_number
         due = self._due(start)
-        return min((each.kept.qos for each in due), default=None)
+        if len(due) > 1:
+            qos = min(each.kept.qos for each in due)
+            due = [each for each in due if each.kept.qos is qos]
+        return due
 
-    def group(self, start: float, most: int) -> RepeatGroup | None:
-        """Up to `most` PDUs to repeat in a burst at `start`: the most urgent ones first.
+    def group(self, due: Iterable[Wanted], start: float, most: int) -> RepeatGroup | None:
+        """Up to `most` of the PDUs that are `due`, to be repeated in a burst at `start`.
 
-        Among equals, the robot for which least was repeated comes first.
+        The robot for which least was repeated comes first.
         """
-        due = self._due(start)
-        for each in list(due):
-            if not self._kept.may_repeat(each.kept):
+        asked, due = due, []
+        for each in asked:
+            if self._kept.may_repeat(each.kept):
+                due.append(each)
+            else:
                 # Another message uses one of its entry ids.
-                due.remove(each)
                 del self.wanted[each.kept.src, each.kept.number]
                 self._unknown += 1
         if not due:
             return None
 
-        def rank(each: Wanted) -> tuple[Qos, float, int]:
+        def rank(each: Wanted) -> tuple[float, int]:
             served_s = min((self._served_s[asker] for asker in each.askers), default=0.0)
-            return each.kept.qos, served_s, each.kept.number
+            return served_s, each.kept.number
 
         due.sort(key=rank)
-        due = [each for each in due if each.kept.qos is due[0].kept.qos]
         known = [each for each in due if start - each.announced_at < ANNOUNCED_S]
         first = (known or due)[0].kept
         like = [

@@ -50,13 +50,13 @@ class OwnTurns:
             k, age_s = self._composer.k_single, max(0.0, now - head.arrived_at)
             waiting = {qos: -(-n // k) for qos, n in self._outbox.waiting_bytes().items()}
             found = self._needing(head.qos, head.priority, age_s, waiting, airtime_s)
-        repeated = None
-        if self._answers.wanted:
-            repeated = self._answers.due_class(now, self._composer.next_number)
-        if repeated is None:
+        if not self._answers.wanted:
+            return found
+        due = self._answers.due(now, self._composer.next_number)
+        if not due:
             return found
         again_s = self.repeats_s(airtime_s)
-        return together(found, Waiting(repeated, MIDDLE_PRIORITY, 0.0, again_s))
+        return together(found, Waiting(due[0].kept.qos, MIDDLE_PRIORITY, 0.0, again_s))
 
     def repeats_s(self, airtime_s: AirtimeOf) -> float:
         """Airtime in s for what is to be repeated, with a PDU that says how old it is."""

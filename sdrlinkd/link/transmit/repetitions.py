@@ -6,7 +6,7 @@ from typing import NamedTuple
 from sdrlinkd.link.access import Access, Slot, Wish
 from sdrlinkd.link.packing import MAX_PDUS, Composer
 from sdrlinkd.link.qos import Qos
-from sdrlinkd.link.repeat import Answers, RepeatGroup
+from sdrlinkd.link.repeat import Answers, RepeatGroup, Wanted
 from sdrlinkd.link.traits import Opportunity
 from sdrlinkd.link.transmit.burst import Burst
 from sdrlinkd.sealing import InTheClear, Sealing
@@ -35,13 +35,15 @@ class Repetitions:
         self._composer = composer
         self._sealing = sealing
 
-    def plan(self, opportunity: Opportunity, qos: Qos, access: Access) -> Planned | None:
-        """What to send again of class `qos`, and when; None: nothing, or not now."""
+    def plan(
+        self, opportunity: Opportunity, due: Sequence[Wanted], access: Access
+    ) -> Planned | None:
+        """Which of the PDUs that are `due` to send again, and when; None: none, or not now."""
         earliest, airtime_s, _, sensed, _ = opportunity
-        group = self._answers.group(earliest, MAX_PDUS - 1)
+        group = self._answers.group(due, earliest, MAX_PDUS - 1)
         if group is None:
             return None
-        mcs, n_told = group.mcs, 0 if group.is_relayed or group.announced else 1
+        qos, mcs, n_told = group.qos, group.mcs, 0 if group.is_relayed or group.announced else 1
         slot = access.slot(Wish(earliest, qos, airtime_s(mcs, 1 + n_told), sensed))
         if slot is None and (access.keeps_schedule or access.by_request is not None):
             # Slots may be made for one PDU, or for faster bursts. A turn is made for what we asked,

@@ -10,6 +10,7 @@ sent again, unchanged except for the ages inside, before a new one is composed.
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from functools import partial
 from itertools import accumulate, chain
 from math import inf
@@ -21,7 +22,7 @@ from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outbox
 from sdrlinkd.link.receive import PduHeard
-from sdrlinkd.link.repeat import Answers
+from sdrlinkd.link.repeat import Answers, Wanted
 from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
 from sdrlinkd.link.traits import Opportunity
 from sdrlinkd.link.transmit.bids import ROOM, Bid, Bids
@@ -150,13 +151,15 @@ class BurstScheduler:
             self._ready_at = earliest - self._fit.lead_s
         repeated = None
         if self._answers.wanted:
-            repeated = self._answers.due_class(earliest, composer.next_number)
-            # Among equals, new messages and repeats take turns.
-            if repeated is not None and (head is None or repeated + self._has_repeated <= head):
-                burst = self._repeat(opportunity, repeated)
-                if burst is not None:
-                    self._has_repeated = True
-                    return burst
+            due = self._answers.due(earliest, composer.next_number)
+            if due:
+                repeated = due[0].kept.qos
+                # Among equals, new messages and repeats take turns.
+                if head is None or repeated + self._has_repeated <= head:
+                    burst = self._repeat(opportunity, due)
+                    if burst is not None:
+                        self._has_repeated = True
+                        return burst
         turns = self._turns
         tells_at = min(access.tells_at, inf if turns is None else turns.asks_at(earliest))
         if head is None and earliest < min(records_due_at, tells_at):
@@ -402,13 +405,13 @@ class BurstScheduler:
         latest = slot.start if is_timed else max(slot.start, slot.late_end - airtime_s)
         return burst._replace(latest=latest)
 
-    def _repeat(self, opportunity: Opportunity, qos: Qos) -> Burst | None:
-        """A burst with PDUs of class `qos` that others lack; None if it cannot leave now."""
+    def _repeat(self, opportunity: Opportunity, due: Sequence[Wanted]) -> Burst | None:
+        """A burst with some of the PDUs that are `due`; None if it cannot leave now."""
         repetitions, access = self._repetitions, self._access
-        planned = repetitions.plan(opportunity, qos, access)
+        planned = repetitions.plan(opportunity, due, access)
         if planned is None:
             return None
-        slot = planned.slot
+        slot, qos = planned.slot, planned.group.qos
         if slot.is_pulse:
             return self._pulse(slot.start, qos)
         if self._sealing.is_on and not self._may_seal(slot.start, 1):
