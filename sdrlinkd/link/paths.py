@@ -50,6 +50,18 @@ def distances(edges: Edges, source: int) -> tuple[dict[int, float], dict[int, in
     return found, before
 
 
+def fewest_hops(edges: Edges, source: int, most_cost: float) -> dict[int, int]:
+    """How many links that cost less than `most_cost` lead from `source` to each robot, at least."""
+    found, newest, hops = {source: 0}, {source}, 0
+    while newest:
+        hops += 1
+        reached = (edges.get(each, {}).items() for each in newest)
+        newest = {other for links in reached for other, cost in links if cost < most_cost}
+        newest -= found.keys()
+        found |= dict.fromkeys(newest, hops)
+    return found
+
+
 def path(edges: Edges, source: int, to: int) -> list[int]:
     """The robots on the best path, with both ends; empty if there is none."""
     _, before = distances(edges, source)

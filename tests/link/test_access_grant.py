@@ -323,6 +323,17 @@ def test_a_plan(present, waiting, served_at, links, is_open):
         assert old <= set(first), "who had no turn for long has one"
 
 
+@pytest.mark.parametrize(("cost", "order"), [(50.0, [2, 4, 3, 5]), (200.0, [2, 3, 4, 5])])
+def test_who_hears_the_plan_now_and_then_comes_before_robots_that_are_more_hops_away(cost, order):
+    """Robot 4 has it from robot 1 sometimes, and then 3 may have it from 4. Usually, 3 tells 4."""
+    links = {(1, 2): 1.0, (2, 3): 1.0, (3, 4): 1.0, (4, 5): 1.0, (1, 4): cost}
+    edges = {}
+    for (one, other), each in links.items():
+        edges.setdefault(one, {})[other] = edges.setdefault(other, {})[one] = each
+    turns = plan(TIMES, 10.0, [2, 3, 4, 5], {}, places_of(1, edges), {}, is_open=False)
+    assert [node for node, _ in turns] == order
+
+
 @law()
 @given(waitings, st.floats(0, 3))
 def test_what_is_sent_is_taken_off(waiting, sent_s):

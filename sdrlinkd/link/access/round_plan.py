@@ -3,7 +3,8 @@
 Every robot that is present gets a turn in which a PDU fits, so that it can send something urgent or
 ask for more. In teams of more than nine, these turns go round. The robots that want the most
 urgent things share a budget of airtime on top of that. Robots that do not hear the root come after
-the robot that passes the plan on to them.
+those that may pass the plan on to them. Where links lose much, the root does not know which one
+will. So the order is that of the fewest hops, and not that of the best paths.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -142,7 +143,7 @@ def plan(
             by = places.parents.get(node)
             if by is not None and by in present and by not in found and by not in before:
                 found.append(by)
-        return sorted(found, key=lambda node: places.levels.get(node, 1))
+        return sorted(found, key=places.order)
 
     runs = heard([*given])
     turns = [(node, ticks(node)) for node in runs]

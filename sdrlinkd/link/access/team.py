@@ -6,7 +6,7 @@ from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.link.access.reuse import NONE_APART, Apart
-from sdrlinkd.link.paths import Edges, distances
+from sdrlinkd.link.paths import Edges, distances, fewest_hops
 from sdrlinkd.wire import FAR
 
 DOUBTFUL, DOUBTED_S = 4.0, 1.5
@@ -32,6 +32,13 @@ class Places(NamedTuple):
     parents: Mapping[int, int]
     costs: Mapping[int, float]
     """What the best path from the root costs."""
+    fewest: Mapping[int, int]
+    """The fewest hops over which plans come, if not always."""
+
+    def order(self, node: int) -> tuple[int, int]:
+        """The order of turns: by the fewest hops, then by those of the best path."""
+        level = self.levels.get(node, 1)
+        return self.fewest.get(node, level), level
 
     def is_behind(self, node: int, relay: int) -> bool:
         """Whether robot `node` hears plans through `relay`, directly or through others."""
@@ -165,4 +172,5 @@ def places_of(root: int, edges: Edges) -> Places:
 
     for node in parents:
         level(node)
-    return Places(levels, {node: by for node, by in parents.items() if by != root}, costs)
+    behind = {node: by for node, by in parents.items() if by != root}
+    return Places(levels, behind, costs, fewest_hops(edges, root, WEAK))
