@@ -42,6 +42,8 @@ class OwnTurns:
         self._piggyback = piggyback
         self._forecasts = forecasts
         self._own_id = own_id
+        self._only_told = False
+        """Whether our last burst held records and no message."""
 
     def waiting(self, now: float, airtime_s: AirtimeOf) -> Waiting | None:
         """What waits here at `now`, to be sent or repeated, with its airtime; None: nothing."""
@@ -114,6 +116,7 @@ class OwnTurns:
                 access.requested(want, start)
             # Others wait for the plan, even if a message here waits to share its PDU.
             if built or not access.plans:
+                self._only_told = False
                 return built, 0
         number, key = composer.take_number(), records.clear_key(start)
         n_records = 1 + (key is not None)
@@ -125,6 +128,7 @@ class OwnTurns:
         if want is not None:
             told.append(want)
             access.requested(want, start)
+        self._only_told = not built
         alone = composer.fill_with_records(start, told, number)
         return [*alone, *built, *([] if key is None else [key])], n_records
 
@@ -156,7 +160,8 @@ class OwnTurns:
     def _is_full(self, waiting: Waiting | None, longest_s: float, airtime_s: AirtimeOf) -> bool:
         """Whether urgent messages need all of a burst, so that records wait for another turn.
 
-        If they do not fit anyway, a request for more comes first, unless it fits beside one.
+        If they do not fit anyway, a request for more comes first, unless it fits beside one. In
+        turns of one PDU, messages and requests take turns: what is asked for may never come.
         """
         if waiting is None or waiting.qos > Qos.LATENCY:
             return False
@@ -165,4 +170,4 @@ class OwnTurns:
             return True
         head = self._outbox.next_message
         is_to_all = head is not None and head.dst == BROADCAST and not head.is_whole
-        return longest_s < two_s and is_to_all
+        return longest_s < two_s and (is_to_all or self._only_told)

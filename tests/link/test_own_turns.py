@@ -1,0 +1,37 @@
+"""Turns of one PDU where more waits than that, and what is asked for never comes."""
+
+from math import inf
+
+import pytest
+
+from sdrlinkd.link import Opportunity, Overrides, Qos
+from sdrlinkd.wire import BROADCAST, Want
+from tests.link.lossy import Air
+from tests.link.test_repeats_in_turns import ROUND_S, StandingTurns
+from tests.link.world import PDU_S, airtime_s, use
+
+
+class UnheardRequests(StandingTurns):
+    """As the robot that plans does not hear any request, it has to be told again and again."""
+
+    def request(self, start, left):
+        return None if left is None else Want(1, left.qos, left.priority, 0, 1, 0)
+
+
+@pytest.mark.parametrize(("dst", "turns"), [(2, 2), (BROADCAST, 1)])
+def test_urgent_messages_and_requests_take_turns_where_a_turn_holds_one_pdu(dst, turns):
+    """A request fits beside a message to everyone, but not beside one that only one robot reads."""
+    air = Air()
+    for link in air.links.values():
+        use(link, UnheardRequests())
+    air._next_burst = lambda link, now: link.next_burst(
+        Opportunity(now, airtime_s, lambda _mcs, longest_s: int(longest_s / PDU_S))
+    )
+    air.run(1.0)
+    n = 6
+    for number in range(n):
+        air.submit(1, number, overrides=Overrides(qos=Qos.URGENT, lifespan_s=inf, dst=dst))
+    air.run(air.now + (turns * n + 1) * ROUND_S)
+    assert sorted(air.numbers(2)) == list(range(n))
+    asked = sum(isinstance(each, Want) for at, each in air.records(1) if at > 1)
+    assert asked >= n - 2
