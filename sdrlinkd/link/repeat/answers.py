@@ -162,7 +162,18 @@ class Answers:
         What has expired by then is dropped. Our next PDU has `next_number`.
         """
         self._next_number = next_number
-        due = self._due(start)
+        is_free = self._budget.free_at(start) <= start
+        due = []
+        for key, each in list(self.wanted.items()):
+            kept = each.kept
+            if kept.expires_at() <= start:
+                self._expired += 1
+                del self.wanted[key]
+            elif kept.first_at < start - AGAIN_S or self._is_stale(kept):
+                self._unknown += 1
+                del self.wanted[key]
+            elif each.due_at <= start and (is_free or not each.askers):
+                due.append(each)
         if len(due) > 1:
             qos = min(each.kept.qos for each in due)
             due = [each for each in due if each.kept.qos is qos]
@@ -173,27 +184,27 @@ class Answers:
 
         The robot for which least was repeated comes first.
         """
-        asked, due = due, []
-        for each in asked:
+        found = []
+        for each in due:
             if self._kept.may_repeat(each.kept):
-                due.append(each)
+                found.append(each)
             else:
                 # Another message uses one of its entry ids.
                 del self.wanted[each.kept.src, each.kept.number]
                 self._unknown += 1
-        if not due:
+        if not found:
             return None
 
         def rank(each: Wanted) -> tuple[float, int]:
             served_s = min((self._served_s[asker] for asker in each.askers), default=0.0)
             return served_s, each.kept.number
 
-        due.sort(key=rank)
-        known = [each for each in due if start - each.announced_at < ANNOUNCED_S]
-        first = (known or due)[0].kept
+        found.sort(key=rank)
+        known = [each for each in found if start - each.announced_at < ANNOUNCED_S]
+        first = (known or found)[0].kept
         like = [
             each.kept
-            for each in known or due
+            for each in known or found
             if (each.kept.src, each.kept.qos, each.kept.mcs) == (first.src, first.qos, first.mcs)
         ]
         chosen = sorted(like[:most], key=lambda kept: kept.number)
@@ -274,21 +285,6 @@ class Answers:
             expired=self._expired,
             refused=self._refused,
         )
-
-    def _due(self, start: float) -> list[Wanted]:
-        is_free = self._budget.free_at(start) <= start
-        due = []
-        for key, each in list(self.wanted.items()):
-            kept = each.kept
-            if kept.expires_at() <= start:
-                self._expired += 1
-                del self.wanted[key]
-            elif kept.first_at < start - AGAIN_S or self._is_stale(kept):
-                self._unknown += 1
-                del self.wanted[key]
-            elif each.due_at <= start and (is_free or not each.askers):
-                due.append(each)
-        return due
 
     def _is_stale(self, kept: Kept) -> bool:
         """Whether others could take a PDU for a new one."""
