@@ -4,11 +4,9 @@ from math import inf
 
 import pytest
 
-from sdrlinkd.link import Opportunity, Overrides, Qos
+from sdrlinkd.link import Overrides, Qos
 from sdrlinkd.wire import BROADCAST, Want
-from tests.link.lossy import Air
-from tests.link.test_repeats_in_turns import ROUND_S, StandingTurns
-from tests.link.world import PDU_S, airtime_s, use
+from tests.link.test_repeats_in_turns import ROUND_S, StandingTurns, in_turns
 
 
 class UnheardRequests(StandingTurns):
@@ -21,12 +19,7 @@ class UnheardRequests(StandingTurns):
 @pytest.mark.parametrize(("dst", "turns"), [(2, 2), (BROADCAST, 1)])
 def test_urgent_messages_and_requests_take_turns_where_a_turn_holds_one_pdu(dst, turns):
     """A request fits beside a message to everyone, but not beside one that only one robot reads."""
-    air = Air()
-    for link in air.links.values():
-        use(link, UnheardRequests())
-    air._next_burst = lambda link, now: link.next_burst(
-        Opportunity(now, airtime_s, lambda _mcs, longest_s: int(longest_s / PDU_S))
-    )
+    air = in_turns(UnheardRequests)
     air.run(1.0)
     n = 6
     for number in range(n):

@@ -43,14 +43,20 @@ class StandingTurns(Free):
         return []
 
 
-@pytest.mark.parametrize(("qos", "comes"), [(Qos.URGENT, True), (Qos.LATENCY, False)])
-def test_what_is_urgent_is_announced_in_one_turn_and_repeated_in_the_next(qos, comes):
-    air = Air(lost=once(3), share=0.5)
+def in_turns(access, **kinds):
+    """Two robots, whose turns come from an access policy each."""
+    air = Air(**kinds)
     for link in air.links.values():
-        use(link, StandingTurns())
+        use(link, access())
     air._next_burst = lambda link, now: link.next_burst(
         Opportunity(now, airtime_s, lambda _mcs, longest_s: int(longest_s / PDU_S))
     )
+    return air
+
+
+@pytest.mark.parametrize(("qos", "comes"), [(Qos.URGENT, True), (Qos.LATENCY, False)])
+def test_what_is_urgent_is_announced_in_one_turn_and_repeated_in_the_next(qos, comes):
+    air = in_turns(StandingTurns, lost=once(3), share=0.5)
     air.run(1.0)
     air.flow(1, 6, every_s=0.3, overrides=Overrides(qos=qos, lifespan_s=inf))
     air.run(air.now + 0.5)

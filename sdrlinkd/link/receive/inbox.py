@@ -141,7 +141,7 @@ class Inbox:
         if control.n_bad:
             self._ledger.skip_records(control.n_bad)
         if not is_relayed:
-            neighbor.note_snr(admitted.snr_db)
+            neighbor.note_snr(admitted.snr_db, at)
         for stamp in stamps:
             self._ages.stamp(pdu.src, stamp, at)
         is_ours = pdu.dst in (BROADCAST, self._own_id) or self._hears_self

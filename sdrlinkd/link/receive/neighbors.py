@@ -59,9 +59,9 @@ class Neighbor:
         """Count one PDU that was heard before."""
         self.duplicates += 1
 
-    def note_snr(self, snr_db: float | None) -> None:
-        """Note the SNR of the newest PDU, which came directly, in dB."""
-        self.direct_at = self.last_heard_at
+    def note_snr(self, snr_db: float | None, at: float) -> None:
+        """Note the SNR in dB of one more PDU, which came directly."""
+        self.direct_at = at
         self.snr_db = snr_db
         if snr_db is None or self.mean_snr_db is None:
             self.mean_snr_db = snr_db
@@ -70,7 +70,7 @@ class Neighbor:
 
     def take_quality(self, since: float) -> tuple[float, float] | None:
         """(mean SNR in dB, share of PDUs lost since the last call); None if nothing came directly
-        since then, and since `since`.
+        since the last call, or nothing after `since`.
 
         What was repeated counts as lost, too.
         """
@@ -149,8 +149,8 @@ class Neighbors:
         ]
 
     def take_qualities(self, since: float) -> Iterator[tuple[int, float, float]]:
-        """(robot, mean SNR in dB, share of its PDUs lost) of the others heard directly since the
-        last call, and since `since`.
+        """(robot, mean SNR in dB, share of its PDUs lost) of the others that were heard directly
+        since the last call, and after `since`.
 
         A robot's counts start anew only when the iterator reaches it.
         """

@@ -35,11 +35,11 @@ class _Sent(NamedTuple):
 class Flow:
     """The PDUs of one source to one destination that this robot sends or forwards.
 
-    `hops` are the robots that have to answer: those that forward next, or the destination. PDU
-    `newest` is the first one.
+    `hops` are the robots that have to answer: those that forward next, or the destination.
+    `number` is that of the first PDU.
     """
 
-    def __init__(self, src: int, dst: int, newest: int) -> None:
+    def __init__(self, src: int, dst: int, number: int) -> None:
         self.src, self.dst = src, dst
         self.robots: frozenset[int] = frozenset()
         """Who forwards next."""
@@ -61,7 +61,7 @@ class Flow:
         """Hops that were left in the last PDU."""
         self.went_around = 0
         """How often the route has gone around a robot that did not answer."""
-        self._newest = newest
+        self._newest = number
         self._sent: deque[_Sent] = deque(maxlen=MOST_KEPT)
         """The PDUs that await an answer."""
         self._answered: dict[int, int] = {}

@@ -54,7 +54,7 @@ class Forwarding:
         """
         flow = self._flows.get((src, dst))
         if flow is None:
-            # Its first PDU is answered, too.
+            # Its hops come before its first PDU, for which they have to answer, too.
             flow = self._flows[src, dst] = Flow(src, dst, number)
             self._reroute(flow, at)
         flow.sent(number, hops_left, at, is_bare=is_bare)

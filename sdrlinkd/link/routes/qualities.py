@@ -66,14 +66,14 @@ class Qualities:
                 self._heard[src] = _Heard(number, at, at, snr_db=snr_db)
             return
         was_away = at - heard.at > max(LEAST_PAUSE_S, _silence_s(heard))
-        is_clear = self._is_clear(snr_db if is_direct else heard.snr_db)
+        was_away = was_away and self._is_clear(snr_db if is_direct else heard.snr_db)
         fade = exp(min(0.0, heard.at - at) / MEMORY_S)
         heard.expected *= fade
         heard.arrived *= fade
         heard.at = max(at, heard.at)
         step = number - heard.newest
         if step > 0:
-            heard.expected += 1 if was_away and is_clear else min(step, MOST_STEP)
+            heard.expected += 1 if was_away else min(step, MOST_STEP)
             heard.newest = number
         if is_direct:
             heard.arrived += 1
