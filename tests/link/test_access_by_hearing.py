@@ -235,6 +235,20 @@ def test_a_report_of_what_was_heard_long_ago_is_not_believed():
         access.told_of(3, 15.5 + i / 2, 2)
 
 
+def test_of_others_only_two_that_we_hear_can_be_apart():
+    """Robot 3 has gone, and 2 has noticed; robot 4 tells of it for longer."""
+    all_but = {node: {other: 1.0 for other in range(1, 5) if other != node} for node in range(1, 5)}
+    access = make_access(params("auction", range(1, 5)), 1, RADIO, LONGEST_S, Random(1))
+    access.know_links(all_but)
+    assert busy(access, 10.0, 15.0, (2, 3, 4)) is None
+    for node in (1, 2):
+        all_but[node].pop(3)
+    access.know_links(all_but)
+    for i in range(40):
+        access.told_of(3, 15.0 + i / 10, 4)
+        assert busy(access, 15.0 + i / 10, 15.1 + i / 10, (2, 4)) is None
+
+
 octet, times = st.integers(0, 255), st.floats(-1, 3)
 whatever = st.one_of(
     told_events,

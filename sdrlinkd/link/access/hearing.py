@@ -42,15 +42,19 @@ class _Sight:
         self.at = max(at, self.at)
 
 
+Sights = dict[int, _Sight]
+
+
 class Hearing:
     """Finds two of the robots `nodes` that do not hear each other."""
 
     def __init__(self, own_id: int, nodes: Sequence[int]) -> None:
         self._own_id = own_id
         self._nodes = frozenset(nodes)
-        self._seen: dict[int, _Sight] = {}
+        self._seen: Sights = {}
         """When we or somebody else heard each robot; for this one, when it heard anybody."""
-        self._heard_at: dict[int, float] = {}
+        self._heard: Sights = {}
+        """When we did. Others may tell of a robot for some time after it has gone."""
         self._edges: Edges = {}
         self._poor_since: dict[Pair, float] = {}
         """Since when LSAs tell of two robots that they do not hear each other well."""
@@ -61,22 +65,26 @@ class Hearing:
 
     def heard(self, node: int, at: float) -> None:
         """Note that we hear a robot."""
-        self._heard_at[node] = at
-        self._see(self._own_id, at)
-        self._see(node, at)
+        for seen in (self._seen, self._heard):
+            self._see(seen, self._own_id, at)
+            self._see(seen, node, at)
 
     def told_of(self, node: int, at: float, by: int) -> None:
         """Note that robot `by` says that it hears a robot; what its LSA denies, was long ago."""
         links = self._edges.get(by)
         if node != self._own_id and (not links or node in links):
-            self._see(node, at)
+            self._see(self._seen, node, at)
 
     def learn(self, edges: Edges) -> None:
         """Take the links that LSAs tell."""
         self._edges = edges
 
     def apart(self, now: float) -> Pair | None:
-        """Two robots that are here and do not hear each other; None: all hear all."""
+        """Two robots that are here and do not hear each other; None: all hear all.
+
+        Of others, they are two that this one hears: where a team is connected and not all hear all,
+        some robot hears two that do not hear each other.
+        """
         here = {node for node, seen in self._seen.items() if seen.at > now - PRESENT_S}
         found, poor, deaf = None, dict[Pair, float](), dict[Pair, float]()
         for pair in combinations(sorted({self._own_id, *here}), 2):
@@ -88,10 +96,10 @@ class Hearing:
             if cost <= DOUBTFUL:
                 continue
             poor[pair] = self._poor_since.get(pair, now)
-            is_apart = self._were_here(pair, poor[pair], POOR_S)
+            is_apart = self._were_here(self._heard, pair, poor[pair], POOR_S)
             if cost >= DEAF_COST:
                 deaf[pair] = self._deaf_since.get(pair, now)
-                is_apart |= self._were_here(pair, deaf[pair], DEAF_S)
+                is_apart |= self._were_here(self._heard, pair, deaf[pair], DEAF_S)
             if is_apart and found is None:
                 found = pair
         self._poor_since, self._deaf_since = poor, deaf
@@ -109,17 +117,20 @@ class Hearing:
         if self._own_id not in pair:
             return False
         (other,) = {*pair} - {self._own_id}
-        return self._were_here(pair, self._heard_at.get(other, -inf), UNHEARD_S)
+        since = self._heard[other].at if other in self._heard else -inf
+        return self._were_here(self._seen, pair, since, UNHEARD_S)
 
-    def _were_here(self, pair: Pair, since: float, for_s: float) -> bool:
+    def _were_here(self, seen: Sights, pair: Pair, since: float, for_s: float) -> bool:
         """Whether two robots, and this one, were here for so long after `since`."""
-        seen = [self._seen[node] for node in {*pair, self._own_id} if node in self._seen]
-        since = max(since, *(each.came_at for each in seen))
-        return min(each.at for each in seen) > since + for_s
+        nodes = {*pair, self._own_id}
+        if not nodes <= seen.keys():
+            return False
+        since = max(since, *(seen[node].came_at for node in nodes))
+        return min(seen[node].at for node in nodes) > since + for_s
 
-    def _see(self, node: int, at: float) -> None:
-        seen = self._seen.get(node)
-        if seen is not None:
-            seen.again(at)
+    def _see(self, seen: Sights, node: int, at: float) -> None:
+        sight = seen.get(node)
+        if sight is not None:
+            sight.again(at)
         elif node in self._nodes:
-            self._seen[node] = _Sight(at, at)
+            seen[node] = _Sight(at, at)
