@@ -1,7 +1,7 @@
 """The records LSA and ROUTE, about links and who forwards (wire document, 6.15 and 6.16)."""
 
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from math import log2
 from typing import NamedTuple
 
@@ -93,6 +93,5 @@ def parse_route(value: bytes) -> Route:
     return Route._make((*_ROUTE.unpack_from(value), bytes(value[_ROUTE.size :])))
 
 
-def _pairs(octets: Iterable[int]) -> tuple[tuple[int, int], ...]:
-    each = iter(octets)
-    return tuple(zip(each, each, strict=False))
+def _pairs(octets: bytes) -> tuple[tuple[int, int], ...]:
+    return tuple(zip(octets[::2], octets[1::2], strict=False))

@@ -1,9 +1,15 @@
-"""PDUs that are on their way while a route changes: they come, whoever has them already."""
+"""Links that change, and PDUs that are on their way meanwhile: they come, whoever has them."""
 
 from collections import Counter
+from itertools import permutations
+
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sdrlinkd.link import Overrides
-from sdrlinkd.wire import BROADCAST, DST, HOP, SEQ, SRC, Route
+from sdrlinkd.link.routes import Routes, cost_of
+from sdrlinkd.wire import BROADCAST, DST, HOP, MAX_LOSS, SEQ, SRC, Lsa, Route, share_of
+from tests.laws import law
 from tests.link.lossy import PDU_SIZE
 from tests.link.test_routes import AUTO, mesh, of_others
 from tests.link.world import compose, make_link, records_in, tell
@@ -107,3 +113,28 @@ def test_a_robot_that_answers_for_others_may_still_not_know_that_it_is_named():
     air.run(air.now + 0.4)
     assert not left
     assert sorted(air.numbers(3)) == list(range(50))
+
+
+robots = st.integers(2, 6)
+losses = st.dictionaries(robots, st.sampled_from([0, 20, MAX_LOSS]), max_size=5)
+
+
+@law(200)
+@given(st.lists(st.tuples(robots, losses, st.sampled_from([0.1, 6.0])), max_size=30))
+def test_links_follow_from_the_newest_lsas_alone(told):
+    """Robots that nobody reaches are forgotten meanwhile. What was given out does not change."""
+    routes, now, newest, given_out = Routes(AUTO, 1, 6, 200, lambda: 0), 0.0, {}, []
+    for number, (node, heard, pause_s) in enumerate(told):
+        now += pause_s
+        routes.look(now)
+        kept = {each.id for each in routes.report(now).robots}
+        newest = {each: of for each, of in newest.items() if each in kept}
+        routes.hear(node, Lsa(node, number, tuple(heard.items())), now)
+        newest[node] = heard
+        wanted = {each: {} for each in newest}
+        for one, other in permutations(newest, 2):
+            way, back = newest[one].get(other, MAX_LOSS), newest[other].get(one, MAX_LOSS)
+            if max(way, back) < MAX_LOSS:
+                wanted[one][other] = cost_of(share_of(way), share_of(back))
+        given_out.append((routes.take_links(), wanted))
+    assert all(links == wanted for links, wanted in given_out)

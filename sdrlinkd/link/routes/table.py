@@ -18,6 +18,8 @@ LEAST_NEWS_S, LEAST_CHANGE_S = 0.1, 0.5
 @dataclass(slots=True)
 class _Held:
     lsa: Lsa
+    losses: Mapping[int, int]
+    """Those of `lsa`, by robot."""
     at: float
     """When it came."""
     reached_at: float
@@ -123,29 +125,55 @@ class LsaTable:
                 held.reached_at = now
             elif now - held.reached_at > FORGOTTEN_S:
                 del self._held[node]
+                self._change(node)
 
     def begin_anew(self) -> None:
         """Go on with another clock: only what comes from now on counts."""
         self._held.clear()
+        self.edges = {}
         self._told_at = -inf
-        self._change()
+        self._change(self._own_id)
 
     def _hold(self, lsa: Lsa, at: float) -> None:
-        losses = tuple({robot: loss for robot, loss in lsa.losses if robot != lsa.node}.items())
+        losses = {robot: loss for robot, loss in lsa.losses if robot != lsa.node}
         before = self._held.get(lsa.node)
         reached_at = at if before is None else before.reached_at
-        self._held[lsa.node] = _Held(lsa._replace(losses=losses), at, reached_at)
-        self._change()
+        lsa = lsa._replace(losses=tuple(losses.items()))
+        self._held[lsa.node] = _Held(lsa, losses, at, reached_at)
+        self._change(lsa.node)
 
-    def _change(self) -> None:
-        heard = {node: dict(each.lsa.losses) for node, each in self._held.items()}
-        edges: dict[int, dict[int, float]] = {node: {} for node in heard}
-        for node, losses in heard.items():
-            for other, loss in losses.items():
-                back = heard.get(other, {}).get(node, MAX_LOSS)
-                if loss < MAX_LOSS and back < MAX_LOSS:
-                    edges[other][node] = cost_of(share_of(loss), share_of(back))
+    def _change(self, node: int) -> None:
+        """Find the links of a robot whose LSA has changed, and who is reached.
+
+        Others keep what they were given as the links before.
+        """
+        links = self._links_of(node)
+        edges = {
+            other: _with(those, node, links.get(other))
+            for other, those in self.edges.items()
+            if other != node
+        }
+        if node in self._held:
+            edges[node] = links
         self.edges = edges
         reached, _ = distances(edges, self._own_id)
         self.reached = sorted(node for node in reached if node in self._held)
         self.version += 1
+
+    def _links_of(self, node: int) -> dict[int, float]:
+        """What the links of a robot cost, by the robot at the other end: the same both ways."""
+        held, links = self._held.get(node), dict[int, float]()
+        for other, loss in () if held is None else held.losses.items():
+            there = self._held.get(other)
+            back = MAX_LOSS if there is None else there.losses.get(node, MAX_LOSS)
+            if loss < MAX_LOSS and back < MAX_LOSS:
+                links[other] = cost_of(share_of(loss), share_of(back))
+        return links
+
+
+def _with(links: Mapping[int, float], node: int, cost: float | None) -> Mapping[int, float]:
+    """The links of a robot, with one to `node` of this cost; None: with none."""
+    if links.get(node) == cost:
+        return links
+    changed = {other: each for other, each in links.items() if other != node}
+    return changed if cost is None else {**changed, node: cost}
