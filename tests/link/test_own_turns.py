@@ -5,7 +5,7 @@ from math import inf
 import pytest
 
 from sdrlinkd.link import Overrides, Qos
-from sdrlinkd.wire import BROADCAST, Want
+from sdrlinkd.wire import BROADCAST, LAST_PLAN, Frame, Grant, Want
 from tests.link.test_repeats_in_turns import ROUND_S, StandingTurns, in_turns
 
 
@@ -28,3 +28,24 @@ def test_urgent_messages_and_requests_take_turns_where_a_turn_holds_one_pdu(dst,
     assert sorted(air.numbers(2)) == list(range(n))
     asked = sum(isinstance(each, Want) for at, each in air.records(1) if at > 1)
     assert asked >= n - 2
+
+
+class PlansToPassOn(StandingTurns):
+    """In each turn there is a plan to pass on, on which the root does not count."""
+
+    must_tell = True
+
+    def told(self, start, length_s, room):
+        return [Frame(1, 1, 0, 0), Grant(0, 1, 0, LAST_PLAN)]
+
+
+def test_urgent_messages_and_plans_take_turns_where_a_turn_holds_one_pdu():
+    """The turns of robots on which the root counts have room for both."""
+    air = in_turns(PlansToPassOn)
+    air.run(1.0)
+    for number in range(6):
+        overrides = Overrides(qos=Qos.URGENT, lifespan_s=inf, dst=BROADCAST)
+        air.submit(1, number, overrides=overrides)
+        air.run(air.now + 2 * ROUND_S)
+        assert number in air.numbers(2)
+    assert sum(isinstance(each, Grant) for at, each in air.records(1) if at > 1) >= 5

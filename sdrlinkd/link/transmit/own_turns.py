@@ -104,11 +104,13 @@ class OwnTurns:
         access, composer, records = self._access, self._composer, self._control_records
         left = None if waiting is None else waiting.without(longest_s)
         want = access.request(start, together(left, self._coming(start, airtime_s)))
-        asks = (want is not None or cannot_wait) and not self._is_full(
-            waiting, longest_s, airtime_s
-        )
+        is_full = self._is_full(waiting, longest_s, airtime_s)
+        asks = (want is not None or cannot_wait) and not is_full
+        # The root gives a turn of two PDUs to those on which it counts. Others hold up nothing.
+        may_wait = is_full and self._only_told and longest_s < airtime_s(2) and not access.plans
+        tells = access.must_tell and not may_wait
         is_idle = not self._outbox.levels and records.is_due(start)
-        if not (access.must_tell or asks or is_idle):
+        if not (tells or asks or is_idle):
             if want is not None:
                 self._piggyback.put_as((RecordType.WANT,), want, inf)
             built = composer.fill(start, allowance, is_mixed=True)
