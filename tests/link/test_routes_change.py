@@ -1,7 +1,7 @@
 """Links that change, and PDUs that are on their way meanwhile: they come, whoever has them."""
 
 from collections import Counter
-from itertools import permutations
+from itertools import pairwise, permutations
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -138,3 +138,19 @@ def test_links_follow_from_the_newest_lsas_alone(told):
                 wanted[one][other] = cost_of(share_of(way), share_of(back))
         given_out.append((routes.take_links(), wanted))
     assert all(links == wanted for links, wanted in given_out)
+
+
+def test_an_lsa_that_somebody_has_missed_is_told_again_as_long_as_it_is_new():
+    """Whoever lacks it tells another digest, and takes us for deaf meanwhile."""
+    routes, told_at = Routes(AUTO, 2, 6, 200, lambda: 0), []
+    for i in range(100):
+        now = i / 20
+        routes.placed(3, BROADCAST, i, now, 20.0, is_direct=True, has_messages=False)
+        routes.look(now)
+        told_at += [now for told in routes.told(now) if getattr(told.record, "node", None) == 2]
+        routes.hear(3, Lsa(BROADCAST, 7 ^ routes.digest().number, ()), now)
+    new = [at for at in told_at if at < 3]
+    assert all(later - at < 0.4 for at, later in pairwise(new))
+    assert len(new) <= 13
+    # All LSAs are told once a second, whatever is new.
+    assert len(told_at) - len(new) == 2

@@ -13,6 +13,8 @@ SYNC_S = 1.0
 """Least time in s until all LSAs are told again."""
 NEWS_S, SYNC_PATIENCE_S = 0.02, 0.2
 """Time in s for which an LSA waits for spare room: if it is new, and if it is told again."""
+AGAIN_S, RECENT_S = 0.3, 3.0
+"""Least time in s until our own LSA is told again, if it is not older than the second one."""
 
 
 class Links:
@@ -28,7 +30,7 @@ class Links:
         self._table = LsaTable(own_id, draw())
         self.news: dict[int, float] = {}
         """The LSAs to be told, by robot, and when each gets a PDU of its own."""
-        self._synced_at = -inf
+        self._synced_at = self._own_told_at = -inf
 
     @property
     def edges(self) -> Edges:
@@ -49,6 +51,7 @@ class Links:
         if lsa.node == BROADCAST:
             if lsa.number != self._table.digest().number:
                 self.tell_all(at)
+                self._tell_own_again(at)
         elif self._table.take(lsa, teller, at) and not self._all_hear(teller):
             self.news[lsa.node] = at + NEWS_S
 
@@ -69,6 +72,7 @@ class Links:
         """Make a new LSA if we hear others than before; forget robots that are gone."""
         if self._table.renew(self.qualities.losses(now), self._most, now) is not None:
             self.news[self._own_id] = now + NEWS_S
+            self._own_told_at = now
         self._table.expire(now)
 
     def take_news(self) -> Iterator[tuple[Lsa, float]]:
@@ -88,7 +92,7 @@ class Links:
         self.qualities.begin_anew()
         self._table.begin_anew()
         self.news.clear()
-        self._synced_at = -inf
+        self._synced_at = self._own_told_at = -inf
 
     def report(self, now: float) -> list[RobotLinksReport]:
         """Whom each robot hears, and how well."""
@@ -100,6 +104,12 @@ class Links:
             )
             for lsa, at in self._table.held()
         ]
+
+    def _tell_own_again(self, at: float) -> None:
+        """Tell our own LSA again if it is new: whoever has missed it may take us for deaf."""
+        if at > self._own_told_at + AGAIN_S and at < self._table.renewed_at + RECENT_S:
+            self._own_told_at = at
+            self.news.setdefault(self._own_id, at + SYNC_PATIENCE_S)
 
     def _all_hear(self, teller: int) -> bool:
         """Whether all robots that we hear are known to hear the one that told something."""

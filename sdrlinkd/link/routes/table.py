@@ -34,7 +34,8 @@ class LsaTable:
         self._own_id = own_id
         self._held: dict[int, _Held] = {}
         self.number_from(first)
-        self._told_at = -inf
+        self.renewed_at = -inf
+        """When our own LSA was made."""
         self._is_overtaken = False
         """Whether others hold an LSA of ours that is newer than ours."""
         self.edges: Edges = {}
@@ -81,10 +82,10 @@ class LsaTable:
             if told == held.lsa.losses:
                 return None
             is_news = {node for node, _ in told} != {node for node, _ in held.lsa.losses}
-            if now - self._told_at < (LEAST_NEWS_S if is_news else LEAST_CHANGE_S):
+            if now - self.renewed_at < (LEAST_NEWS_S if is_news else LEAST_CHANGE_S):
                 return None
         self._number = (self._number + 1) % LSA_NUMBERS
-        self._told_at, self._is_overtaken = now, False
+        self.renewed_at, self._is_overtaken = now, False
         lsa = Lsa(self._own_id, self._number, told)
         self._hold(lsa, now)
         return lsa
@@ -131,7 +132,7 @@ class LsaTable:
         """Go on with another clock: only what comes from now on counts."""
         self._held.clear()
         self.edges = {}
-        self._told_at = -inf
+        self.renewed_at = -inf
         self._change(self._own_id)
 
     def _hold(self, lsa: Lsa, at: float) -> None:
