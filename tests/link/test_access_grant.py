@@ -3,6 +3,7 @@
 from collections import defaultdict
 from functools import cache
 from itertools import combinations, pairwise
+from math import inf
 from random import Random
 
 import pytest
@@ -500,3 +501,23 @@ def test_who_sends_in_no_turns_is_told_of():
     (notice,) = access.notices(team.t)
     assert notice.startswith("robot 3 sends outside of the turns that it is given")
     assert access.notices(team.t + 100.0) == []
+
+
+@pytest.mark.parametrize("had_turn", [True, False])
+def test_a_turn_for_anybody_is_not_for_robots_that_the_root_knows(had_turn):
+    """It leaves robots out of a round now and then. They would collide with one that is new."""
+    access = make_access(params("grant", [1, 2, 3]), 1, TRAITS, LONGEST_S, Random(1))
+
+    def starts(number, robot, now):
+        access.take_frame(2, Frame(2, 0, schedule_of((1, 2, 3)), 0), now)
+        access.take_grant(2, Grant(number, 1, 1000, ((robot, 40),)), now)
+        return access.turn_at(now)
+
+    now = 1.0
+    if had_turn:
+        assert starts(0, 1, now) < now + 0.01
+        now += 0.02
+    assert (starts(1, ANYBODY, now) < inf) != had_turn
+    now += 2 * access.round_s
+    assert starts(2, 3, now) == inf
+    assert starts(3, ANYBODY, now + 0.02) < inf

@@ -64,7 +64,7 @@ class Grants(BusyChannel):
         """Whose plans are kept."""
         self._planner = Planner(own_id, self._team, times)
         self._request = OwnRequest(own_id, times, self.round_s)
-        self._rounds = KnownRounds(own_id, times)
+        self._rounds = KnownRounds(own_id, len(nodes), times)
         self._urgent = UrgentTurns(own_id, len(nodes), times)
         """Who always asks for urgent turns."""
         self._behind: dict[int, WantRecord] = {}
