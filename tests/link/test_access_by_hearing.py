@@ -222,7 +222,7 @@ def test_a_pause_of_a_robot_or_of_ours_is_not_deafness(sources):
     access.know_links(APART)
     assert busy(access, 15.0, 15.1) is None
     assert busy(access, 15.1, 16.0, sources) is None
-    assert 17.5 <= busy(access, 16.0, 20.0) < 17.6
+    assert 18.5 <= busy(access, 16.0, 20.0) < 18.6
 
 
 def test_a_report_of_what_was_heard_long_ago_is_not_believed():

@@ -9,10 +9,10 @@ from sdrlinkd.link.access.team import DOUBTFUL, PRESENT_S
 from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.pauses import usual_gap
 
-DEAF_S, POOR_S = 1.5, 5.0
+DEAF_S, POOR_S = 2.5, 5.0
 """Time in s for which two robots must have been here, and have told nothing of each other, or that
-they hear each other poorly, before they count as apart. After a pause, what came meanwhile counts
-as lost for some time."""
+they hear each other poorly, before they count as apart. A short pause of one of them and an LSA
+that was lost may come together. After a pause, what came meanwhile counts as lost for some time."""
 DEAF_COST = 1e4
 """Cost of a link on which next to nothing arrives."""
 UNHEARD_S = PRESENT_S
