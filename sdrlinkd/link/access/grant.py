@@ -22,7 +22,7 @@ from sdrlinkd.link.access.round_plan import PLAN_SIZE, Times
 from sdrlinkd.link.access.strays import Strays
 from sdrlinkd.link.access.tdma_states import Happens
 from sdrlinkd.link.access.team import Team
-from sdrlinkd.link.access.turns import ALMOST_S
+from sdrlinkd.link.access.turns import ALMOST_S, Turn
 from sdrlinkd.link.access.urgent_turns import UrgentTurns
 from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.qos import Qos
@@ -64,7 +64,7 @@ class Grants(BusyChannel):
         """Whose plans are kept."""
         self._planner = Planner(own_id, self._team, times)
         self._request = OwnRequest(own_id, times, self.round_s)
-        self._rounds = KnownRounds(own_id, len(nodes), times)
+        self._rounds = KnownRounds(own_id, times)
         self._urgent = UrgentTurns(own_id, len(nodes), times)
         """Who always asks for urgent turns."""
         self._behind: dict[int, WantRecord] = {}
@@ -150,7 +150,7 @@ class Grants(BusyChannel):
                 if start >= latest:
                     # Too early: decide at the last query before that start.
                     return None
-                if turn.node == ANYBODY and not self._open.tries(turn.begin, self._absent()):
+                if turn.node == ANYBODY and not self._open.tries(turn.begin, self._absent(turn)):
                     continue
                 if leads.takes_over and turn.node == self._own_id:
                     leads.begin(start, Happens.LOSES)
@@ -292,6 +292,6 @@ class Grants(BusyChannel):
         places = self._team.places(self.leads.root)
         return self.leads.follows and self._rounds.must_pass_on(places)
 
-    def _absent(self) -> int:
-        """How many robots have no turns of their own."""
-        return len({*self._team.nodes} - {*self._rounds.nodes(), self.leads.root})
+    def _absent(self, turn: Turn) -> int:
+        """How many robots have no turn of their own in the round of this one."""
+        return len({*self._team.nodes} - {*self._rounds.beside(turn), self.leads.root})

@@ -1,7 +1,6 @@
 """The rounds that a robot knows of, and its turns in them."""
 
 from collections.abc import Iterator
-from math import inf
 
 from sdrlinkd.link.access.round_plan import Times
 from sdrlinkd.link.access.team import Places
@@ -10,19 +9,18 @@ from sdrlinkd.wire import Grant
 
 
 class KnownRounds:
-    """The rounds that go on or will begin, as far as robot `own_id` of `n` robots knows them.
+    """The rounds that go on or will begin, as far as robot `own_id` knows them.
 
     Two plans whose rounds begin less than a least turn apart may be the same.
     """
 
-    def __init__(self, own_id: int, n: int, times: Times) -> None:
+    def __init__(self, own_id: int, times: Times) -> None:
         self._own_id = own_id
         self._same_s = times.turn_s
         self._root_s = times.root_s
         """Longest time from the end of a round until the plan of the next one is known."""
-        self._between_s = times.between_s(n)
-        self._had_turn_at = -inf
-        """When our last turn of this root began."""
+        self._had_turn = False
+        """Whether a plan of this root had a turn of ours."""
         self._rounds: list[Round] = []
         self.plan: tuple[float, Grant] | None = None
         """The root's last plan, and the time from which its begin counts."""
@@ -39,11 +37,11 @@ class KnownRounds:
         last = self.last
         if last is None or now > last.end + self._root_s:
             return "a plan"
-        return "" if self._had_turn_at > -inf else "a turn"
+        return "" if self._had_turn else "a turn"
 
     def forget(self) -> None:
         """Begin anew with another root."""
-        self._rounds, self.plan, self._had_turn_at = [], None, -inf
+        self._rounds, self.plan, self._had_turn = [], None, False
 
     def made(self, found: Round) -> None:
         """Go on with a round of our own."""
@@ -57,21 +55,14 @@ class KnownRounds:
             # Another robot has passed on the same plan.
             return False
         self.plan = since, grant
-        for turn in found.turns:
-            if turn.node == self._own_id:
-                self._had_turn_at = turn.begin
+        self._had_turn |= any(turn.node == self._own_id for turn in found.turns)
         self._rounds = [*(each.until(found.begin) for each in self._rounds[-1:]), found]
         return True
 
     def own_turns(self) -> Iterator[Turn]:
-        """The turns in which we may send, in order.
-
-        Turns for anybody are not for robots that the root knows, and leaves out of a round.
-        """
+        """The turns in which we may send, in order."""
         for each in self._rounds:
-            for turn in each.of(self._own_id):
-                if turn.node == self._own_id or turn.begin > self._had_turn_at + self._between_s:
-                    yield turn
+            yield from each.of(self._own_id)
 
     def has_turn(self, node: int, at: float, slack_s: float) -> bool | None:
         """Whether a robot has a turn at `at`; None: no round is known for that time."""
@@ -81,9 +72,9 @@ class KnownRounds:
                 return any(turn.begin - slack_s <= at <= turn.end for turn in turns)
         return None
 
-    def nodes(self) -> set[int]:
-        """The robots with turns."""
-        return {turn.node for each in self._rounds for turn in each.turns}
+    def beside(self, turn: Turn) -> set[int]:
+        """The robots with turns in the round that a turn belongs to."""
+        return {each.node for known in self._rounds if turn in known.turns for each in known.turns}
 
     def must_pass_on(self, places: Places) -> bool:
         """Whether a robot in the last plan has to hear it from us, and has not yet."""

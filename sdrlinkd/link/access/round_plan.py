@@ -8,7 +8,7 @@ will. So the order is that of the fewest hops, and not that of the best paths.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from math import ceil, inf
+from math import inf
 from struct import pack
 from typing import NamedTuple
 
@@ -68,10 +68,6 @@ class Times(NamedTuple):
         least_s = self.turn_s + self.ticks.guard_s + self.ticks.tick_s
         turns_s = (others + SPARE_TURNS) * least_s + (2 + others) * self.turn_s
         return turns_s + self.budget_s + self.react_s + self.hears_s
-
-    def between_s(self, n: int) -> float:
-        """The longest time between two turns of one of `n` robots."""
-        return (1 + ceil((n - 1) / LEAST_TURNS)) * self.round_s(n)
 
     @property
     def root_s(self) -> float:

@@ -13,7 +13,7 @@ ALMOST_S = 1e-9
 class Turn(NamedTuple):
     """The air belongs to robot `node` from `begin` to `end`, in s.
 
-    ANYBODY stands for those that the root does not know.
+    ANYBODY stands for those without a turn.
     """
 
     node: int
