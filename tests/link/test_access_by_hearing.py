@@ -225,6 +225,19 @@ def test_a_pause_of_a_robot_or_of_ours_is_not_deafness(sources):
     assert 18.5 <= busy(access, 16.0, 20.0) < 18.6
 
 
+def test_a_pause_that_is_not_noticed_and_a_lost_lsa_together_are_not_deafness():
+    """Where robots are heard every half second, a pause of 1 s shows nothing."""
+    access = make_access(params("auction", [1, 2, 3]), 1, RADIO, LONGEST_S, Random(1))
+    access.know_links(APART)
+    for i in range(9):
+        at = 1.0 + i / 2
+        for src in (2,) if i == 1 else (2, 3):
+            access.heard(src, at, False)
+            access.beacon(src, at)
+        # In the 2 s after the pause, an LSA that was lost can come again.
+        assert ("do not hear" in access.state) == (at > 4.5)
+
+
 def test_a_report_of_what_was_heard_long_ago_is_not_believed():
     """The LSA of robot 2 denies that it hears robot 3, which has gone."""
     access, _ = access_with()

@@ -11,8 +11,9 @@ from sdrlinkd.link.pauses import usual_gap
 
 DEAF_S, POOR_S = 2.5, 5.0
 """Time in s for which two robots must have been here, and have told nothing of each other, or that
-they hear each other poorly, before they count as apart. A short pause of one of them and an LSA
-that was lost may come together. After a pause, what came meanwhile counts as lost for some time."""
+they hear each other poorly, before they count as apart. In the first one, a pause that is not
+noticed (below) has room, and after it a lost LSA that comes again. After a pause, what came
+meanwhile counts as lost for some time."""
 DEAF_COST = 1e4
 """Cost of a link on which next to nothing arrives."""
 UNHEARD_S = PRESENT_S
@@ -121,7 +122,7 @@ class Hearing:
         return self._were_here(self._seen, pair, since, UNHEARD_S)
 
     def _were_here(self, seen: Sights, pair: Pair, since: float, for_s: float) -> bool:
-        """Whether two robots, and this one, were here for so long after `since`."""
+        """Whether two robots, and this one, were here for so long after `since`, by `seen`."""
         nodes = {*pair, self._own_id}
         if not nodes <= seen.keys():
             return False

@@ -14,7 +14,8 @@ SYNC_S = 1.0
 NEWS_S, SYNC_PATIENCE_S = 0.02, 0.2
 """Time in s for which an LSA waits for spare room: if it is new, and if it is told again."""
 AGAIN_S, RECENT_S = 0.3, 3.0
-"""Least time in s until our own LSA is told again, if it is not older than the second one."""
+"""Least time in s between two times that our own LSA is told, and the age in s up to which a digest
+that differs brings it again so soon."""
 
 
 class Links:

@@ -106,7 +106,8 @@ class OwnTurns:
         want = access.request(start, together(left, self._coming(start, airtime_s)))
         is_full = self._is_full(waiting, longest_s, airtime_s)
         asks = (want is not None or cannot_wait) and not is_full
-        # The root gives a turn of two PDUs to those on which it counts. Others hold up nothing.
+        # The root gives two PDUs to those on which it counts to pass its plan on. At others, an
+        # urgent message goes before the plan every other time.
         may_wait = is_full and self._only_told and longest_s < airtime_s(2) and not access.plans
         tells = access.must_tell and not may_wait
         is_idle = not self._outbox.levels and records.is_due(start)
