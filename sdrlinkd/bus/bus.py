@@ -10,6 +10,7 @@ import zmq
 
 from sdrlinkd.bus import envelope
 from sdrlinkd.bus.announcement import announcement
+from sdrlinkd.bus.handed import header_of
 from sdrlinkd.bus.intake import Ingress, Intake
 from sdrlinkd.bus.retained import Retained, Retention
 from sdrlinkd.bus.sockets import RuntimeDirectory
@@ -121,26 +122,7 @@ class Bus:
         `retain` says how many messages of its topic and source are kept for later consumers.
         """
         frame = self._frame_out(message.src, message.topic)
-        header = envelope.OutHeader(
-            s=message.src,
-            n=message.number,
-            tr=received_ns,
-            ty=message.topic.type,
-            g=message.lost_pdus,
-            h=message.hops_left,
-            age=None if age_s is None else round(age_s * 1e6),
-            sn=message.snr_db,
-            tl=times.published_ns,
-            eb=times.published_error_us,
-            ts=times.sampled_ns,
-            es=times.sampled_error_us,
-        )
-        if message.series != message.topic_id:
-            header.sr = message.series
-        if age_s is not None:
-            wait_s, reassembly_s, air_s, _ = message.parts(0.0)
-            header.dw, header.dr = round(1e6 * wait_s), round(1e6 * reassembly_s)
-            header.da = round(1e6 * air_s)
+        header = header_of(message, age_s, received_ns, times)
         self._published += 1
         if retain.depth:
             kept = Retained(frame, header, message.payload, retain.lifespan_s, time.monotonic())

@@ -47,6 +47,11 @@ class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
     dw: int | None = None
     dr: int | None = None
     da: int | None = None
+    b: int | None = None
+    e: int | None = None
+    pn: int | None = None
+    sq: int | None = None
+    ps: int = 0
     stop: bool = False
     late: bool = False
     sr: int | None = None

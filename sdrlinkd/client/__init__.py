@@ -45,6 +45,7 @@ from sdrlinkd.client.messages import (
     Message,
     Receipt,
 )
+from sdrlinkd.client.names import MessageName
 from sdrlinkd.client.paths import (
     CONTROL_SOCKET,
     IN_PUB_SOCKET,
@@ -78,6 +79,7 @@ __all__ = [
     "ControlClient",
     "EnvelopeMismatchError",
     "Message",
+    "MessageName",
     "MessageRefusedError",
     "NoDaemonError",
     "Publisher",

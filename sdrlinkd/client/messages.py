@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from sdrlinkd.client.errors import EnvelopeMismatchError
 from sdrlinkd.client.flatmap import unpack
+from sdrlinkd.client.names import MessageName, name_in
 
 ENVELOPE_VERSION = b"\x01"
 # Only one client subscribes to an ack topic. The daemon answers on it when the subscription is
@@ -39,7 +40,8 @@ class Message:
     the daemon publishes when the topic falls silent. `is_late` marks a message that was received
     before this subscriber subscribed, and kept for it; `age_us` is its age when it was handed over.
     `series` tells apart the messages of several producers of one declared topic; it is 0 for the
-    first producer, and for topics of the registry.
+    first producer, and for topics of the registry. `name` tells the message from others at all
+    robots that hear it; stop messages have none.
     """
 
     topic: str
@@ -62,6 +64,7 @@ class Message:
     is_stop: bool = False
     is_late: bool = False
     series: int = 0
+    name: MessageName | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +136,7 @@ def decode_in(frames: Sequence[bytes]) -> Message | None:
         is_stop=fields.get("stop", False),
         is_late=fields.get("late", False),
         series=fields.get("sr", 0),
+        name=name_in(fields),
     )
 
 

@@ -41,6 +41,7 @@ from sdrlinkd.link.receive import (
     CDR_HEADER_SIZE,
     NOT_RETAINED,
     Delivered,
+    MessageName,
     Retain,
 )
 from sdrlinkd.link.repeat import RepeatParams
@@ -110,6 +111,7 @@ __all__ = [
     "Link",
     "LinkParams",
     "Lives",
+    "MessageName",
     "Names",
     "Offer",
     "Opportunity",

@@ -42,6 +42,8 @@ class Joined(NamedTuple):
     topic_id: int
     payload: bytes
     entry_id: int
+    number: int
+    """Its number among the large messages of its topic."""
 
 
 @dataclass(slots=True)
@@ -57,6 +59,13 @@ class Partial:
     """(number of parity fragments, octets of a fragment, octets of the message) of the parity."""
     parity: dict[int, dict[int, bytes]] = field(default_factory=dict)
     """Pieces of parity fragments, by offset and then by number."""
+    pdus: tuple[int, int] = (0, 0)
+    """Numbers of the first and the last PDU with something of the message."""
+
+    def note_pdu(self, number: int) -> None:
+        """Note the number of another PDU with something of the message."""
+        first, last = self.pdus
+        self.pdus = min(first, number), max(last, number)
 
 
 @dataclass(slots=True)

@@ -34,8 +34,10 @@ class Reassembly:
         self.started = 0
         self.began_at = 0.0
         """Arrival time of the first fragment of the message that `add` returned last."""
+        self.pdus = 0, 0
+        """Numbers of the first and the last PDU with something of that message."""
 
-    def add(self, src: int, entry: Entry, now: float) -> bytes | None:
+    def add(self, src: int, entry: Entry, now: float, pdu_number: int = 0) -> bytes | None:
         """Take one entry; returns the message if that completes it, else None."""
         topic_id, entry_id, index, total, payload = entry
         source = self._sources.get(src)
@@ -44,6 +46,7 @@ class Reassembly:
                 self._give_up(src, source, (topic_id, entry_id), "rx_partial_superseded")
             self.started += topic_id != PARTS
             self.began_at = now
+            self.pdus = pdu_number, pdu_number
             return payload
         if source is None:
             source = self._sources[src] = Source()
@@ -59,12 +62,15 @@ class Reassembly:
                 partial = None
         if partial is None:
             partial = self._start(source, key, total, now)
+            partial.pdus = pdu_number, pdu_number
         elif index in partial.parts:
             return None
+        partial.note_pdu(pdu_number)
         if len(partial.parts) == total - 1:
             partial.parts[index] = payload
             self._remove(source, key)
             self.began_at = partial.began_at
+            self.pdus = partial.pdus
             return b"".join([partial.parts[i] for i in range(total)])
         partial.parts[index] = payload
         self._keep(src, source, key, len(payload), now)
@@ -107,11 +113,11 @@ class Reassembly:
             self._remove_large(source, key)
             self.began_at = large.began_at
             whole = b"".join([large.parts[i] for i in range(large.n_parts)])
-            return Joined(part.topic_id, whole, large.entry_id)
+            return Joined(part.topic_id, whole, large.entry_id, part.number)
         self._keep_bounds(src, source)
         return None
 
-    def hold(self, src: int, parity: Parity, now: float) -> Partial | None:
+    def hold(self, src: int, parity: Parity, now: float, pdu_number: int = 0) -> Partial | None:
         """Keep parity with its incomplete message and return that message.
 
         None if no such message is held, or if the parity is not new or does not match it.
@@ -130,6 +136,7 @@ class Reassembly:
         ):
             return None
         partial.shape = shape
+        partial.note_pdu(pdu_number)
         partial.parity.setdefault(parity.at, pieces)[parity.number] = parity.data
         self._keep(src, source, key, len(parity.data), now)
         return source.partials.get(key)

@@ -51,6 +51,17 @@ def test_a_late_subscriber_gets_the_kept_messages_and_then_the_new_ones(start_da
         assert received(heard, 1) == [(22, False)], "what the later one was owed is no news here"
 
 
+def test_a_kept_message_has_the_name_that_it_had_at_first(start_daemon):
+    daemon = start_daemon(LATCHED)
+    with Subscriber(HEARD, runtime_dir=daemon.directory) as early:
+        published(daemon, 2)
+        at_first = [early.receive(20).name for _ in range(2)]
+    with Subscriber(HEARD, runtime_dir=daemon.directory) as late:
+        kept = [late.receive(20).name for _ in range(2)]
+    assert kept == at_first
+    assert not kept[0].matches(kept[1])
+
+
 def test_its_age_is_that_of_its_handover(start_daemon):
     daemon = start_daemon(LATCHED)
     with Subscriber(HEARD, runtime_dir=daemon.directory) as heard:

@@ -11,6 +11,7 @@ from sdrlinkd.link.receive.delivered import (
     DELIVERED,
     NOT_RETAINED,
     Delivered,
+    MessageName,
     Retain,
 )
 from sdrlinkd.link.receive.duplicates import SequenceTrack
@@ -43,6 +44,7 @@ __all__ = [
     "Ended",
     "Event",
     "Latency",
+    "MessageName",
     "Neighbor",
     "Neighbors",
     "Newcomer",

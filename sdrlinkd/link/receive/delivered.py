@@ -10,7 +10,6 @@ CDR_HEADER_SIZE = 4
 DELIVERED = "delivered"
 """Outcome of a delivered message, in place of a ledger's reason."""
 
-
 UNNAMED = HeardTopic(0, "", "")
 
 
@@ -24,6 +23,26 @@ class Retain(NamedTuple):
 
 
 NOT_RETAINED = Retain(0, inf)
+
+
+class MessageName(NamedTuple):
+    """Tells a message from all others of its source and topic, alike at all robots that hear it.
+
+    `boot_id` is None until the source has told it. `entry_id` is that on the air, or for a large
+    message 256 plus its message number. `first_pdu` is the number of the first PDU from which this
+    robot took something of the message (of the last part of a large one), and `more_pdus` how far
+    the last such PDU is behind. Only the lowest octet of `first_pdu` counts until the source has
+    told its PDU numbers (`is_numbered`). The bus document says when two names match (3.4).
+    """
+
+    boot_id: int | None
+    entry_id: int
+    first_pdu: int
+    more_pdus: int
+    is_numbered: bool
+
+
+UNNAMED_MESSAGE = MessageName(None, 0, 0, 0, is_numbered=False)
 
 
 class Delivered(NamedTuple):
@@ -51,6 +70,7 @@ class Delivered(NamedTuple):
     ended_at: float = 0.0
     series: int = 0
     topic: HeardTopic = UNNAMED
+    name: MessageName = UNNAMED_MESSAGE
 
     def parts(self, now: float) -> Parts:
         """The parts of the message's age at `now`; without a STAMP the wait counts as 0."""

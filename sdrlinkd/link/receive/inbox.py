@@ -12,6 +12,7 @@ from sdrlinkd.link.receive.completion import Completion
 from sdrlinkd.link.receive.door import Admitted
 from sdrlinkd.link.receive.events import Ended, Event, Newcomer, PduHeard, PduPlaced
 from sdrlinkd.link.receive.heard_records import HeardRecords
+from sdrlinkd.link.receive.naming import LARGE, name_of
 from sdrlinkd.link.receive.neighbors import Neighbor, Neighbors
 from sdrlinkd.link.receive.pdu_read import PduRead, PduReader
 from sdrlinkd.link.receive.recorded import OwnPdus, RecentCommands
@@ -162,7 +163,7 @@ class Inbox:
             elif isinstance(record, Repeat) and not is_relayed and admitted.is_proven:
                 self._ledger.skip_records(not self._repeated.take(record, pdu.src, track, at))
         self._records.take(pdu, admitted, neighbor, records, is_relayed, now, events)
-        repaired = self._repaired(pdu.src, records, at) if records else []
+        repaired = self._repaired(pdu.src, records, at, track.number) if records else []
         if self._reassembly.lost:
             # Parity takes memory, too, so older messages may have been evicted.
             self._note_lost(now, events)
@@ -236,12 +237,12 @@ class Inbox:
         self._completion.forget(src, now, events)
         self._topics.forget(src)
 
-    def _repaired(self, src: int, records: list[Record], at: float) -> list[Entry]:
+    def _repaired(self, src: int, records: list[Record], at: float, pdu_number: int) -> list[Entry]:
         """Missing fragments that can be computed now, with the parity in `records`."""
         partials = {}
         for record in records:
             if isinstance(record, Parity) and is_sound(record):
-                partial = self._reassembly.hold(src, record, at)
+                partial = self._reassembly.hold(src, record, at, pdu_number)
                 if partial is not None:
                     partials[record.topic_id, record.entry_id] = partial
         entries = [
@@ -262,26 +263,28 @@ class Inbox:
         events: list[Event],
     ) -> None:
         src, at = pdu.src, admitted.at
-        reassembly = self._reassembly
+        reassembly, pdu_number = self._reassembly, neighbor.track.number
         for entry in entries:
             topic_id = entry.topic_id
             if topic_id == CONTROL_TOPIC_ID and self._has_control:
                 continue
-            payload = reassembly.add(src, entry, at)
+            payload = reassembly.add(src, entry, at, pdu_number)
             if payload is None:
                 continue
             stamped = (topic_id, entry.entry_id)
+            name = name_of(neighbor, entry.entry_id, reassembly.pdus)
             if topic_id == PARTS:
                 part = parse_part(payload)
                 joined = part and reassembly.join(src, entry.entry_id, part, at)
                 if not joined:
                     continue
-                topic_id, payload, entry_id = joined
+                topic_id, payload, entry_id, number = joined
                 stamped = (PARTS, entry_id)
+                name = name_of(neighbor, LARGE + number, reassembly.pdus)
             message = Whole(
                 src, topic_id, payload, pdu.compressed, self._ages.take(src, *stamped), stamped, at,
                 admitted.ended_at, reassembly.began_at, pdu.hop, neighbor.snr_db,
-                admitted.is_proven,
+                name, admitted.is_proven,
             )  # fmt: skip
             self._completion.take(message, now, events)
         if reassembly.lost:

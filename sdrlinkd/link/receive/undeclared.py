@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sdrlinkd.link.receive.ages import Origin
+from sdrlinkd.link.receive.delivered import UNNAMED_MESSAGE, MessageName
 
 HOLD_S = 1.0
 """Time in s for which a message waits for its topic's declaration."""
@@ -34,6 +35,7 @@ class Whole(NamedTuple):
     began_at: float
     hops_left: int
     snr_db: float | None
+    name: MessageName = UNNAMED_MESSAGE
     is_proven: bool = True
     """Whether its source has proven to be alive."""
 
