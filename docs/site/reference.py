@@ -8,7 +8,7 @@ import pypandoc
 import typer
 
 from sdrlinkd import __version__, manual
-from sdrlinkd.cli import ether
+from sdrlinkd.cli import ether, gateway
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.commands import COMMANDS
 
@@ -16,6 +16,7 @@ DOCS = Path(__file__).parents[1]
 MAN_PAGES = {
     "sdrlinkctl.1": ("sdrlinkctl", "inspects and controls sdrlinkd"),
     "sdrlink-ether.1": ("sdrlink-ether", "the hub of a simulated air for sdrlinkd"),
+    "sdrlink-gateway.1": ("sdrlink-gateway", "joins the robots of sdrlinkd to a fleet over Zenoh"),
     "sdrlinkd.toml.5": ("configuration", "the configuration of sdrlinkd"),
     "sdrlinkd.8": ("sdrlinkd", "carries ROS 2 messages between robots over software radio"),
 }
@@ -44,6 +45,12 @@ def pages() -> dict[str, str]:
             "sdrlink-ether",
             typer.main.get_command(ether.app),
             'Daemons with `backend = "ether"` share one simulated air, of which this is the hub.',
+        ),
+        "sdrlink-gateway": manual.commands_page(
+            "sdrlink-gateway",
+            typer.main.get_command(gateway.app),
+            "A gateway runs beside a daemon and reads the same file, section `[fleet]`. It needs "
+            "the extra `zenoh`. `sdrlinkctl help fleet` shows how to use it.",
         ),
     }
 

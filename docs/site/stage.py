@@ -23,6 +23,7 @@ BESIDE_CODE = {
     "radios/adding.md": "backends/README.md",
     "radios/index.md": "docs/radios/README.md",
     "reference/bus.md": "sdrlinkd/bus/README.md",
+    "reference/fleet.md": "sdrlinkd/fleet/README.md",
     "reference/wire.md": "sdrlinkd/wire/README.md",
     "reference/link.md": "sdrlinkd/link/README.md",
     "reference/phy.md": "phy/README.md",

@@ -3,6 +3,7 @@
 from sdrlinkd.config.backends import backend_of, typed_config
 from sdrlinkd.config.describe import allowed as allowed_text
 from sdrlinkd.config.describe import given as given_text
+from sdrlinkd.config.fleet import FleetParams
 from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
 from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
@@ -30,6 +31,7 @@ __all__ = [
     "ChannelParams",
     "Config",
     "DirectParams",
+    "FleetParams",
     "GnuRadioParams",
     "ModemParams",
     "PlayParams",

@@ -14,6 +14,7 @@ from backends import (
     SoapyParams,
     ZmqParams,
 )
+from sdrlinkd.config.fleet import FleetParams
 from sdrlinkd.config.pdu_links import (
     ChannelParams,
     DirectParams,
@@ -117,6 +118,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     gnuradio: GnuRadioParams = GnuRadioParams()
     channel: ChannelParams = ChannelParams()
     play: PlayParams = PlayParams()
+    fleet: FleetParams = FleetParams()
     topic: dict[str, TopicPolicy] = {}
     """Topic policies by registry name, as in `[topic.odom]`."""
 

@@ -19,6 +19,7 @@ from tests.machine import lacks
 
 ROOT = Path(__file__).parents[2]
 UNITS = [ROOT / "systemd" / name for name in ("sdrlinkd.service", "sdrlinkd@.service")]
+GATEWAY = ROOT / "systemd" / "sdrlink-gateway.service"
 # What may differ between the units for one node and for several.
 OF_THE_NODE = {"ExecStart", "RuntimeDirectory", "StateDirectory"}
 WATCHDOG_S = 0.3
@@ -28,7 +29,7 @@ needs_systemd_analyze = pytest.mark.skipif(
     shutil.which("systemd-analyze") is None,
     reason=lacks("systemd"),
 )
-each_unit = pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.name)
+each_unit = pytest.mark.parametrize("unit", [*UNITS, GATEWAY], ids=lambda unit: unit.name)
 
 
 # The units.

@@ -1,0 +1,79 @@
+"""`sdrlink-gateway`: joins a daemon's robots to a fleet over Zenoh."""
+
+import asyncio
+import logging
+import signal
+import sys
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import uvloop
+
+from sdrlinkd import __version__
+from sdrlinkd.config import load_config, make_setup
+from sdrlinkd.errors import UserError
+from sdrlinkd.journal import log_to_stderr
+from sdrlinkd.parent import end_with_parent
+
+DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
+NO_ZENOH = "the gateway needs Zenoh: pip install 'sdrlinkd[zenoh]'"
+
+app = typer.Typer(name="sdrlink-gateway", pretty_exceptions_enable=False, add_completion=True)
+
+
+@app.command()
+def gateway(
+    config: Annotated[
+        Path, typer.Option("--config", metavar="FILE", help="The daemon's configuration (TOML).")
+    ] = DEFAULT_CONFIG,
+    check: Annotated[
+        bool, typer.Option("--check", help="Check `[fleet]` and the file it names, and exit.")
+    ] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    """Put what the daemon's robots send on Zenoh, and send them what `fleet.down` allows."""
+    if version:
+        typer.echo(f"sdrlink-gateway {__version__}")
+        return
+    setup = make_setup(load_config(config), config.parent, str(config))
+    try:
+        from sdrlinkd.fleet import check_zenoh, run_gateway
+    except ModuleNotFoundError as error:
+        if error.name != "zenoh":
+            raise
+        raise UserError(NO_ZENOH) from None
+    if check:
+        check_zenoh(setup.config.fleet, config.parent)
+        typer.echo("the configuration is valid")
+        return
+    log_to_stderr(logging.INFO)
+    with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+        runner.run(_until_stopped(run_gateway(setup, config.parent)))
+
+
+async def _until_stopped(work: Coroutine[Any, Any, None]) -> None:
+    """Do `work` until SIGINT or SIGTERM."""
+    task = asyncio.ensure_future(work)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, task.cancel)
+    try:
+        await task
+    except asyncio.CancelledError:
+        return
+
+
+def main() -> None:
+    """Run the gateway; the exit code is 2 for errors that a person can fix."""
+    end_with_parent()
+    try:
+        app(prog_name="sdrlink-gateway")
+    except UserError as error:
+        sys.stderr.write(f"sdrlink-gateway: {error}\n")
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

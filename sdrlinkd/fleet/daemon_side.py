@@ -1,0 +1,59 @@
+"""The daemon beside a gateway: its messages, and what it says of the robots that it hears."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+import msgspec
+
+from sdrlinkd.client import AsyncSubscriber, ControlClient, Message, NoDaemonError, RefusedError
+from sdrlinkd.reports import Snapshot
+
+POLL_S = 0.5
+ANSWER_S = 2.0
+
+_log = logging.getLogger(__name__)
+
+
+class DaemonSide:
+    """Follows the daemon at `directory` (None: where clients look), also across its restarts."""
+
+    def __init__(self, directory: str | None) -> None:
+        self._directory = directory
+        self.snapshot: Snapshot | None = None
+        """The daemon's last report; None while it does not answer."""
+
+    async def listen(self, take: Callable[[Message], None]) -> None:
+        """Call `take` for each message from the air; waits for the daemon if it is away."""
+        is_told = False
+        while True:
+            try:
+                async with AsyncSubscriber(runtime_dir=self._directory) as heard:
+                    _log.info("listening to the daemon at %s", heard.directory)
+                    is_told = False
+                    while True:
+                        take(await heard.receive())
+            except NoDaemonError as error:
+                if not is_told:
+                    _log.warning("%s; waiting for it", error)
+                is_told = True
+                await asyncio.sleep(POLL_S)
+
+    async def look(self, see: Callable[[Snapshot | None], None]) -> None:
+        """Call `see` with the daemon's report twice a second; with None while it is away."""
+        while True:
+            try:
+                answer = await asyncio.to_thread(self._ask, "status", None)
+                self.snapshot = msgspec.convert(answer, Snapshot)
+            except (NoDaemonError, RefusedError):
+                self.snapshot = None
+            see(self.snapshot)
+            await asyncio.sleep(POLL_S)
+
+    async def declare(self, name: str, kind: str) -> None:
+        """Declare a topic of type `kind` on the bus. Raises RefusedError and NoDaemonError."""
+        await asyncio.to_thread(self._ask, "declare", {"name": name, "type": kind})
+
+    def _ask(self, verb: str, arguments: dict[str, str] | None) -> object:
+        with ControlClient(self._directory, timeout_s=ANSWER_S) as control:
+            return control.ask(verb, {**arguments} if arguments else None)

@@ -1,0 +1,133 @@
+"""Which messages of a robot a gateway puts on Zenoh, and when (fleet document, section 3)."""
+
+from collections import deque
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from sdrlinkd.client import MessageName
+from sdrlinkd.fleet.names import Key, NamedRecently
+
+FIRST_HOLD_S = 0.02
+LEAST_HOLD_S = 0.002
+MOST_HOLD_S = 0.5
+HELD_FOR = 1.5
+"""A copy is held for so many times what nearly all of the leader's puts took."""
+NEARLY_ALL = 0.95
+REMEMBERED = 64
+"""The leader's last puts of which the delay is remembered."""
+
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class _Known(Generic[T]):
+    """A message of which something is known: that we heard it, or that another put it."""
+
+    heard_at: float | None = None
+    passed_at: float | None = None
+    """When another gateway's put came."""
+    is_put: bool = False
+    item: T | None = None
+    """What is held of it."""
+
+
+class Forwarding(Generic[T]):
+    """A gateway's messages of one robot; items of any type, times in s.
+
+    What is to be put is returned. The gateway that leads puts at once; the others hold their copy.
+    """
+
+    def __init__(self) -> None:
+        self._known: NamedRecently[_Known[T]] = NamedRecently()
+        self._held: deque[tuple[float, _Known[T]]] = deque()
+        self._delays: deque[float] = deque(maxlen=REMEMBERED)
+        self.hold_s = FIRST_HOLD_S
+        self.left_to_others = 0
+        """Messages that another gateway put."""
+        self.put_for_others = 0
+        """Messages that the leader did not put in time, and this gateway did."""
+        self.put_twice = 0
+        """Messages that the leader put after all."""
+
+    def heard(
+        self, key: Hashable, name: MessageName | None, item: T, now: float, *, leads: bool
+    ) -> T | None:
+        """Take a message from the radio; returns it if it is to be put now."""
+        if name is None:
+            # Each daemon makes a stop message of its own.
+            self.left_to_others += not leads
+            return item if leads else None
+        at: Key = (key,)
+        known = self._known.find(at, name, now)
+        if known is None:
+            known = _Known[T](heard_at=now)
+            self._known.add(at, name, known, now)
+        elif known.heard_at is not None:
+            return None
+        else:
+            known.heard_at = now
+            if known.passed_at is not None:
+                self._learn(now, known.passed_at)
+                self.left_to_others += 1
+                return None
+        if leads:
+            known.is_put = True
+            return item
+        known.item = item
+        self._held.append((now + self.hold_s, known))
+        return None
+
+    def passed(self, key: Hashable, name: MessageName | None, now: float) -> None:
+        """Note that another gateway has put a message."""
+        if name is None:
+            return
+        at: Key = (key,)
+        known = self._known.find(at, name, now)
+        if known is None:
+            self._known.add(at, name, _Known(passed_at=now), now)
+            return
+        if known.passed_at is not None:
+            return
+        known.passed_at = now
+        if known.heard_at is None:
+            return
+        self._learn(known.heard_at, now)
+        if known.is_put:
+            self.put_twice += 1
+            self.hold_s = min(MOST_HOLD_S, 2 * self.hold_s)
+        elif known.item is not None:
+            known.item = None
+            self.left_to_others += 1
+
+    @property
+    def due_at(self) -> float:
+        """When `due` has something next, in s."""
+        self._skip()
+        return self._held[0][0] if self._held else float("inf")
+
+    def due(self, now: float) -> list[T]:
+        """The copies that have been held for long enough."""
+        found = []
+        while self._held and self.due_at <= now:
+            _, known = self._held.popleft()
+            if known.item is not None:
+                found.append(known.item)
+                known.item, known.is_put = None, True
+                self.put_for_others += 1
+        return found
+
+    def lead(self) -> list[T]:
+        """All copies that are held, as this gateway leads from now on."""
+        return self.due(float("inf"))
+
+    def _skip(self) -> None:
+        while self._held and self._held[0][1].item is None:
+            self._held.popleft()
+
+    def _learn(self, heard_at: float, passed_at: float) -> None:
+        """Learn how much later than we hear a message the leader's put of it arrives."""
+        self._delays.append(max(0.0, passed_at - heard_at))
+        ordered = sorted(self._delays)
+        usual_s = ordered[int(NEARLY_ALL * (len(ordered) - 1))]
+        self.hold_s = min(MOST_HOLD_S, max(LEAST_HOLD_S, HELD_FOR * usual_s))

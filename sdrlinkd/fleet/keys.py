@@ -1,0 +1,96 @@
+"""Keys of a fleet on Zenoh (fleet document, section 1)."""
+
+import re
+from typing import NamedTuple
+from urllib.parse import quote, unquote
+
+ROOT = "sdrlink"
+_ROBOT = re.compile(r"robot_(0|[1-9][0-9]{0,2})\Z")
+MOST_ROBOTS = 254
+
+
+class TopicKey(NamedTuple):
+    """The robot and the topic of a message."""
+
+    robot: int
+    topic: str
+
+
+class Keys:
+    """The keys of fleet `name`."""
+
+    def __init__(self, name: str) -> None:
+        self.prefix = f"{ROOT}/{name}"
+
+    def message(self, robot: int, topic: str) -> str:
+        """Of messages of a topic of a robot, and of commands to it."""
+        # A chunk that begins with @ would not match wildcards, and empty chunks are not allowed.
+        chunks = [quote(each, safe="_.-") for each in topic.split("/") if each]
+        return "/".join([self.prefix, f"robot_{robot}", *chunks])
+
+    def messages(self, robot: int) -> str:
+        """Of all messages of one robot, and of commands to it."""
+        return f"{self.prefix}/robot_{robot}/**"
+
+    @property
+    def all_messages(self) -> str:
+        """Of all messages of all robots."""
+        return f"{self.prefix}/**"
+
+    def gateway(self, gateway: int, what: str = "") -> str:
+        """Of a gateway's token, or of `what` can be queried of it."""
+        return f"{self.prefix}/@gw/{gateway}" + (f"/{what}" if what else "")
+
+    @property
+    def gateways(self) -> str:
+        """Of the tokens of all gateways, and of the robots that they hear."""
+        return f"{self.prefix}/@gw/**"
+
+    def hears(self, gateway: int, robot: int) -> str:
+        """Of the token that a gateway hears a robot."""
+        return self.gateway(gateway, f"robot_{robot}")
+
+    def route(self, robot: int) -> str:
+        """Of the gateways' claims to a robot."""
+        return f"{self.prefix}/@route/robot_{robot}"
+
+    @property
+    def routes(self) -> str:
+        """Of the gateways' claims to all robots."""
+        return f"{self.prefix}/@route/*"
+
+    def sent(self, robot: int) -> str:
+        """Of what becomes of commands to a robot."""
+        return f"{self.prefix}/@sent/robot_{robot}"
+
+    @property
+    def all_sent(self) -> str:
+        """Of what becomes of commands to all robots."""
+        return f"{self.prefix}/@sent/*"
+
+    def read_message(self, key: str) -> TopicKey | None:
+        """The robot and topic in the key of a message; None for any other key."""
+        prefix, _, rest = key.partition(f"{self.prefix}/")
+        robot, _, topic = rest.partition("/")
+        number = _robot(robot)
+        if prefix or number is None or not topic:
+            return None
+        return TopicKey(number, unquote(topic, errors="replace"))
+
+    def read_robot(self, key: str) -> int | None:
+        """The robot in the last chunk of a key; None if there is none."""
+        return _robot(key.rpartition("/")[2])
+
+    def read_hears(self, key: str) -> tuple[int, int | None] | None:
+        """(gateway, robot that it hears or None) in the key of a token; None for any other key."""
+        prefix, _, rest = key.partition(f"{self.prefix}/@gw/")
+        gateway, _, robot = rest.partition("/")
+        if prefix or not gateway.isdecimal() or len(gateway) > len(str(MOST_ROBOTS)):
+            return None
+        number = _robot(robot)
+        return None if robot and number is None else (int(gateway), number)
+
+
+def _robot(chunk: str) -> int | None:
+    found = _ROBOT.match(chunk)
+    return int(found[1]) if found and int(found[1]) <= MOST_ROBOTS else None

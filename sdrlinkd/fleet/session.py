@@ -1,0 +1,230 @@
+"""A Zenoh session for programs on an asyncio event loop.
+
+Zenoh calls back from threads of its own. Here every callback runs on the loop, in the order of
+arrival, from a queue that is bounded.
+"""
+
+import asyncio
+import contextlib
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import zenoh
+
+from sdrlinkd.config import FleetParams
+from sdrlinkd.errors import UserError
+from sdrlinkd.fleet.putting import Lane
+from sdrlinkd.fleet.zenoh_config import cause, zenoh_config
+
+MOST_WAITING = 8192
+MOST_QUERIES = 64
+UNREACHED = "Unable to connect"
+"""In Zenoh's error where no router answers."""
+TRY_AGAIN_S = 0.5
+AT_ONCE = 256
+"""Callbacks that run before the loop does other work."""
+
+_log = logging.getLogger(__name__)
+
+_QOS = {
+    "urgent": (zenoh.Priority.REAL_TIME, True, zenoh.CongestionControl.BLOCK),
+    "latency": (zenoh.Priority.INTERACTIVE_HIGH, True, zenoh.CongestionControl.BLOCK),
+    "default": (zenoh.Priority.DATA, False, zenoh.CongestionControl.BLOCK),
+    "bulk": (zenoh.Priority.BACKGROUND, False, zenoh.CongestionControl.DROP),
+}
+
+
+class Sample(NamedTuple):
+    """What came for a subscription."""
+
+    key: str
+    payload: bytes
+    attachment: bytes | None
+
+
+class Answer(NamedTuple):
+    """An answer to a query."""
+
+    key: str
+    payload: bytes
+    attachment: bytes | None = None
+
+
+class Session:
+    """A Zenoh session on the running event loop. It finds a router again by itself."""
+
+    def __init__(self, session: zenoh.Session, loop: asyncio.AbstractEventLoop) -> None:
+        self._session = session
+        self._loop = loop
+        self._waiting: deque[Callable[[], None]] = deque()
+        self._lock = threading.Lock()
+        self._queries = 0
+        self._lanes = {name: Lane(f"zenoh-{name}") for name in ("block", "drop")}
+        self._answers = Lane("zenoh-answers", MOST_QUERIES)
+        self._transports = 0
+        self._declared: list[Any] = []
+        self.on_reach: Callable[[bool], None] = lambda _is_reached: None
+        """Called when the first other Zenoh node is reached, and when the last one has gone."""
+        self.overrun = 0
+        """Samples dropped because this program could not keep up."""
+        self.queries_refused = 0
+        """Queries refused because too many waited."""
+        self._declared.append(
+            session.info.declare_transport_events_listener(self._note_transport, history=True)
+        )
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether another Zenoh node is connected."""
+        return self._transports > 0
+
+    @property
+    def failed(self) -> int:
+        """Puts that Zenoh refused."""
+        return sum(lane.failed for lane in self._lanes.values())
+
+    def put(self, key: str, payload: bytes, attachment: bytes | None, qos: str) -> bool:
+        """Put a value with the priority of class `qos`; False if too many puts wait."""
+        priority, express, congestion = _QOS.get(qos, _QOS["default"])
+        lane = "block" if congestion is zenoh.CongestionControl.BLOCK else "drop"
+        return self._lanes[lane].offer(
+            lambda: self._session.put(
+                key, payload, attachment=attachment, priority=priority, express=express,
+                congestion_control=congestion,
+            )
+        )  # fmt: skip
+
+    def subscribe(self, key: str, take: Callable[[Sample], None]) -> Callable[[], None]:
+        """Call `take` for each value that others put at `key`; returns what ends that."""
+
+        def heard(sample: zenoh.Sample) -> None:
+            if sample.kind != zenoh.SampleKind.PUT:
+                return
+            attachment = None if sample.attachment is None else sample.attachment.to_bytes()
+            told = Sample(str(sample.key_expr), sample.payload.to_bytes(), attachment)
+            self._post(lambda: take(told))
+
+        others = zenoh.Locality.REMOTE
+        return self._keep(self._session.declare_subscriber(key, heard, allowed_origin=others))
+
+    def watch(self, key: str, take: Callable[[str, bool], None]) -> Callable[[], None]:
+        """Call `take` with the key of each token, and whether it is there."""
+
+        def heard(sample: zenoh.Sample) -> None:
+            told, is_there = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
+            self._post(lambda: take(told, is_there))
+
+        liveliness = self._session.liveliness()
+        return self._keep(liveliness.declare_subscriber(key, heard, history=True))
+
+    def token(self, key: str) -> Callable[[], None]:
+        """Set up a liveliness token; returns what takes it down."""
+        return self._keep(self._session.liveliness().declare_token(key))
+
+    def answer(self, key: str, answers: Callable[[str], Iterable[Answer]]) -> Callable[[], None]:
+        """Answer queries that intersect `key`: `answers` gets the key that was asked for."""
+
+        def asked(query: zenoh.Query) -> None:
+            if self._queries >= MOST_QUERIES:
+                self.queries_refused += 1
+                query.reply_err(b"too many queries; ask again later")
+                query.drop()  # type: ignore[no-untyped-call]
+                return
+            self._queries += 1
+            self._loop.call_soon_threadsafe(self._answer, query, answers)
+
+        return self._keep(self._session.declare_queryable(key, asked))
+
+    async def close(self) -> None:
+        """Take everything down; what was put has a moment to leave."""
+        for each in (*self._lanes.values(), self._answers):
+            await asyncio.to_thread(each.close)
+        await asyncio.to_thread(self._session.close)
+
+    def _keep(self, declared: Any) -> Callable[[], None]:  # noqa: ANN401 (several types)
+        # Without a reference, Zenoh would take it down.
+        self._declared.append(declared)
+
+        def end() -> None:
+            if declared in self._declared:
+                self._declared.remove(declared)
+                with contextlib.suppress(zenoh.ZError):
+                    declared.undeclare()
+
+        return end
+
+    def _answer(self, query: zenoh.Query, answers: Callable[[str], Iterable[Answer]]) -> None:
+        found = list(answers(str(query.key_expr)))
+
+        def reply() -> None:
+            try:
+                for key, payload, attachment in found:
+                    query.reply(key, payload, attachment=attachment)
+            finally:
+                query.drop()  # type: ignore[no-untyped-call]
+                self._queries -= 1
+
+        if not self._answers.offer(reply):
+            self._queries -= 1
+            self.queries_refused += 1
+
+    def _post(self, action: Callable[[], None]) -> None:
+        """Have `action` run on the loop; called by Zenoh's threads."""
+        with self._lock:
+            if len(self._waiting) >= MOST_WAITING:
+                self.overrun += 1
+                return
+            self._waiting.append(action)
+            is_first = len(self._waiting) == 1
+        if is_first:
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self._drain)
+
+    def _drain(self) -> None:
+        with self._lock:
+            n = min(len(self._waiting), AT_ONCE)
+            actions = [self._waiting.popleft() for _ in range(n - 1)]
+            # The last one stays until it has run, so that `_post` does not call this again.
+            actions.append(self._waiting[0])
+        for action in actions:
+            action()
+        with self._lock:
+            self._waiting.popleft()
+            is_more = bool(self._waiting)
+        if is_more:
+            self._loop.call_soon(self._drain)
+
+    def _note_transport(self, event: zenoh.TransportEvent) -> None:
+        is_new = event.kind == zenoh.SampleKind.PUT
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._count_transport, 1 if is_new else -1)
+
+    def _count_transport(self, change: int) -> None:
+        was_reached = self.is_reached
+        self._transports += change
+        if self.is_reached != was_reached:
+            self.on_reach(self.is_reached)
+
+
+async def open_session(params: FleetParams, folder: Path) -> Session:
+    """Open a session as `[fleet]` says, once a router is there.
+
+    File names are relative to `folder`. Raises UserError.
+    """
+    config = zenoh_config(params, folder)
+    is_told = False
+    while True:
+        try:
+            session = await asyncio.to_thread(zenoh.open, config)
+            return Session(session, asyncio.get_running_loop())
+        except zenoh.ZError as error:
+            if UNREACHED not in str(error):
+                raise UserError(f"Zenoh cannot be opened: {cause(error)}") from None
+            if not is_told:
+                _log.warning("no Zenoh router is reached (%s); waiting for one", cause(error))
+            is_told = True
+            await asyncio.sleep(TRY_AGAIN_S)

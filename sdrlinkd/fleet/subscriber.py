@@ -1,0 +1,110 @@
+"""For operators' programs: messages of a fleet's robots, each once, and commands to them."""
+
+import asyncio
+import secrets
+import time
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple, Self
+
+from sdrlinkd.config import FleetParams
+from sdrlinkd.fleet.formats import Command, Fate, Passed, encode, read_fate, read_passed
+from sdrlinkd.fleet.keys import Keys
+from sdrlinkd.fleet.names import Duplicates
+from sdrlinkd.fleet.session import Sample, Session, open_session
+
+MOST_WAITING = 4096
+
+
+class FleetMessage(NamedTuple):
+    """A message of a robot, as a gateway put it."""
+
+    robot: int
+    topic: str
+    payload: bytes
+    passed: Passed
+    """What the gateway says of it: type, age, SNR and so on."""
+
+
+class FleetClient:
+    """Hears the robots of a fleet, and sends to them; to be entered with `async with`."""
+
+    def __init__(self, params: FleetParams, folder: Path = Path()) -> None:
+        self._params = params
+        self._folder = folder
+        self._keys = Keys(params.name)
+        self._session: Session | None = None
+        self._messages: asyncio.Queue[FleetMessage] = asyncio.Queue(MOST_WAITING)
+        self._duplicates = Duplicates()
+        self._operator = secrets.token_hex(4)
+        self._numbers = iter(range(1 << 53))
+        self.on_fate: Callable[[int, Fate], None] = lambda _robot, _fate: None
+        """Called with what becomes of this program's commands."""
+        self.overrun = 0
+        """Messages dropped because nobody took them in time."""
+
+    async def __aenter__(self) -> Self:
+        self._session = await open_session(self._params, self._folder)
+        self._session.subscribe(self._keys.all_messages, self._take)
+        self._session.subscribe(self._keys.all_sent, self._told)
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._session is not None:
+            await self._session.close()
+
+    @property
+    def duplicates(self) -> int:
+        """Messages that came from a second gateway, too, and were dropped here."""
+        return self._duplicates.dropped
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether a Zenoh node is connected."""
+        return self._session is not None and self._session.is_reached
+
+    async def receive(self) -> FleetMessage:
+        """Wait for the next message and return it."""
+        return await self._messages.get()
+
+    async def __aiter__(self) -> AsyncIterator[FleetMessage]:
+        while True:
+            yield await self.receive()
+
+    def command(
+        self, robot: int, topic: str, cdr: bytes, *, kind: str = "", qos: str = "",
+        lifespan_ms: float | None = None,
+    ) -> int:  # fmt: skip
+        """Send a command to a robot; returns its number, which `on_fate` gets with its fate.
+
+        `kind` is its type, needed for topics that the gateway's daemon does not know.
+        """
+        if self._session is None:
+            raise RuntimeError("enter the client with `async with` first")
+        number = next(self._numbers)
+        command = Command(self._operator, number, kind, qos, lifespan_ms)
+        key = self._keys.message(robot, topic)
+        self._session.put(key, cdr, encode(command), qos or "urgent")
+        return number
+
+    def _take(self, sample: Sample) -> None:
+        told, passed = self._keys.read_message(sample.key), read_passed(sample.attachment)
+        if told is None or passed is None:
+            return
+        if not self._duplicates.is_new((sample.key, passed.sr), passed.name, time.monotonic()):
+            return
+        if self._messages.full():
+            self._messages.get_nowait()
+            self.overrun += 1
+        self._messages.put_nowait(FleetMessage(*told, sample.payload, passed))
+
+    def _told(self, sample: Sample) -> None:
+        robot, fate = self._keys.read_robot(sample.key), read_fate(sample.payload)
+        if robot is not None and fate is not None and fate.op == self._operator:
+            self.on_fate(robot, fate)

@@ -1,0 +1,89 @@
+"""An operator's command is sent by one gateway, in order, and by another one if the first fails."""
+
+import pytest
+
+from sdrlinkd.fleet import Command, Commands, Fate, Order, Refusal
+
+TWIST = b"\0\1\0\0" + bytes(48)
+
+
+def take(commands, n=1, now=0.0, leads=False, op="desk", patience_s=0.0, **more):
+    return commands.take(2, "cmd_vel", Command(op, n, **more), TWIST, now, patience_s, leads=leads)
+
+
+def fate(name, n=1, gw=8, op="desk"):
+    return Fate(gw, "cmd_vel", op, n, name)
+
+
+def test_the_leader_sends_at_once_and_only_once():
+    commands = Commands(7)
+    order = take(commands, leads=True)
+    assert isinstance(order, Order)
+    assert order.id == (2, "cmd_vel", "desk", 1)
+    assert take(commands, leads=True) is Refusal.AGAIN
+    assert commands.due(1.0) == []
+
+
+def test_an_older_one_of_the_same_operator_is_outdated():
+    commands = Commands(7)
+    take(commands, n=5, leads=True)
+    assert take(commands, n=4, leads=True) is Refusal.OUTDATED
+    assert isinstance(take(commands, n=4, leads=True, op="tablet"), Order)
+
+
+def test_another_gateway_sends_what_the_leader_does_not_take():
+    commands = Commands(7)
+    assert take(commands, patience_s=0.02) is None
+    assert commands.due_at == pytest.approx(0.07)
+    assert commands.due(0.069) == []
+    assert [order.id[3] for order in commands.due(0.071)] == [1]
+    assert commands.due(0.2) == []
+
+
+@pytest.mark.parametrize("early", [True, False])
+def test_what_the_leader_takes_is_left_to_it(early):
+    commands = Commands(7)
+    if early:
+        commands.told(2, fate("taken"), 0.0)
+    assert take(commands, leads=early) is None, "it had just been the leader of another view"
+    if not early:
+        commands.told(2, fate("taken"), 0.01)
+    assert commands.due(1.0) == []
+    commands.told(2, fate("delivered"), 0.03)
+    assert commands.due(1.0) == []
+
+
+def test_what_the_leader_cannot_deliver_is_sent_by_the_next_while_it_is_of_use():
+    commands = Commands(7)
+    take(commands, ls=500.0)
+    commands.told(2, fate("taken"), 0.01)
+    commands.told(2, fate("unknown"), 0.2)
+    assert [order.id[3] for order in commands.due(0.2)] == [1]
+    take(commands, n=2, now=1.0, ls=500.0)
+    commands.told(2, fate("dropped", n=2), 1.6)
+    assert commands.due(2.0) == []
+
+
+def test_a_command_without_a_number_is_the_leaders_alone():
+    commands = Commands(7)
+    assert take(commands, n=None) is None
+    assert commands.due(1.0) == []
+    assert isinstance(take(commands, n=None, leads=True), Order)
+    assert isinstance(take(commands, n=None, leads=True), Order), "a joystick repeats itself"
+
+
+def test_its_own_words_change_nothing():
+    commands = Commands(7)
+    take(commands)
+    commands.told(2, fate("taken", gw=7), 0.01)
+    assert len(commands.due(0.9)) == 1
+
+
+def test_memory_is_bounded_whatever_operators_and_gateways_say():
+    commands = Commands(7)
+    for n in range(10_000):
+        take(commands, n=n, now=n / 1e4, op=f"op{n}")
+        commands.told(3, fate("taken", n=n, op="other"), n / 1e4)
+    assert len(commands._known) <= 4096
+    assert len(commands._early) <= 4096
+    assert len(commands._newest) <= 256

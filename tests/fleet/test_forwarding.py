@@ -1,0 +1,152 @@
+"""Of several gateways that hear a message, one puts it; none is lost, and late ones are learnt."""
+
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sdrlinkd.client import MessageName
+from sdrlinkd.fleet import Duplicates, Forwarding
+from tests.laws import law
+
+STEP_S = 0.0005
+
+
+class Gateways:
+    """Gateways that hear messages of one robot by chance; puts arrive after `delay_s()`."""
+
+    def __init__(self, heard_of, delay_s, leader=0):
+        self.heard_of = heard_of
+        self.delay_s = delay_s
+        self.leader = leader
+        self.now = 0.0
+        self.each = [Forwarding() for _ in heard_of]
+        self.puts = []
+        """(time, gateway, message)."""
+        self._in_flight = []
+
+    def run(self, until):
+        while self.now < until:
+            self.now += STEP_S
+            arrived = [each for each in self._in_flight if each[0] <= self.now]
+            self._in_flight = [each for each in self._in_flight if each[0] > self.now]
+            for _, gateway, number in arrived:
+                self.each[gateway].passed("odom", name_of(number), self.now)
+            for gateway, forwarding in enumerate(self.each):
+                for number in forwarding.due(self.now):
+                    self.put(gateway, number)
+
+    def put(self, src, number):
+        self.puts.append((self.now, src, number))
+        for gateway in range(len(self.each)):
+            if gateway != src:
+                self._in_flight.append((self.now + self.delay_s(), gateway, number))
+
+    def send(self, number, rng):
+        heard = [gw for gw, p in enumerate(self.heard_of) if rng.random() < p]
+        for gateway in heard:
+            forwarding = self.each[gateway]
+            leads = gateway == self.leader
+            item = forwarding.heard("odom", name_of(number), number, self.now, leads=leads)
+            if item is not None:
+                self.put(gateway, item)
+        return heard
+
+
+def name_of(number):
+    return MessageName(7, number % 256, number, number % 3)
+
+
+def run(gateways, n=600, every_s=0.01, seed=1):
+    """Send `n` messages; returns the numbers of those that at least one gateway heard."""
+    rng, heard = Random(seed), set()
+    for number in range(0, 5 * n, 5):
+        if gateways.send(number, rng):
+            heard.add(number)
+        gateways.run(gateways.now + every_s)
+    gateways.run(gateways.now + 1.0)
+    return heard
+
+
+def test_two_that_hear_most_put_all_of_it_once():
+    gateways = Gateways([0.94, 0.78], lambda: 0.0004)
+    heard = run(gateways)
+    assert sorted(number for *_, number in gateways.puts) == sorted(heard)
+    assert len(heard) / 600 == pytest.approx(1 - 0.06 * 0.22, abs=0.01)
+    second = gateways.each[1]
+    assert second.put_for_others == sum(gateway == 1 for _, gateway, _ in gateways.puts)
+    assert second.left_to_others > 400
+
+
+def test_what_the_leader_missed_is_little_later():
+    gateways = Gateways([0.5, 1.0], lambda: 0.0004)
+    rng = Random(3)
+    late = []
+    for number in range(0, 3000, 5):
+        sent_at = gateways.now
+        gateways.send(number, rng)
+        gateways.run(gateways.now + 0.03)
+        if number > 500:
+            late += [
+                at - sent_at for at, gateway, n in gateways.puts if (gateway, n) == (1, number)
+            ]
+    assert max(late) < 0.004
+
+
+def test_a_copy_is_held_for_longer_where_the_leader_is_far():
+    rng = Random(5)
+    gateways = Gateways([0.9, 0.9], lambda: rng.uniform(0.04, 0.06))
+    run(gateways)
+    assert 0.06 < gateways.each[1].hold_s < 0.1
+    twice = len(gateways.puts) - len({number for *_, number in gateways.puts})
+    assert twice <= 20
+    assert twice == gateways.each[1].put_twice
+
+
+def test_without_a_leader_nothing_is_lost():
+    gateways = Gateways([0.9, 0.8, 0.3], lambda: 0.001, leader=None)
+    heard = run(gateways)
+    assert {number for *_, number in gateways.puts} == heard
+
+
+def test_who_leads_from_now_on_puts_what_it_held():
+    forwarding = Forwarding()
+    assert forwarding.heard("odom", name_of(0), "a", 0.0, leads=False) is None
+    assert forwarding.lead() == ["a"]
+    assert forwarding.due(1.0) == []
+
+
+def test_stop_messages_have_no_name_and_only_the_leader_puts_them():
+    forwarding = Forwarding()
+    assert forwarding.heard("cmd_vel", None, "stop", 0.0, leads=False) is None
+    assert forwarding.heard("cmd_vel", None, "stop", 0.0, leads=True) == "stop"
+    assert forwarding.due(9.0) == []
+
+
+@law(60)
+@given(
+    st.lists(st.floats(0.1, 1.0), min_size=1, max_size=4), st.integers(0, 2**32),
+    st.floats(0.0, 0.3), st.sampled_from((None, 0)),
+)  # fmt: skip
+def test_any_delays_lose_nothing_and_no_gateway_puts_twice(heard_of, seed, most_s, leader):
+    rng = Random(seed)
+    gateways = Gateways(heard_of, lambda: rng.uniform(0, most_s), leader)
+    heard = run(gateways, 40, seed=seed)
+    assert {number for *_, number in gateways.puts} == heard
+    by = [(gateway, number) for _, gateway, number in gateways.puts]
+    assert len(by) == len(set(by))
+    consumer = Duplicates()
+    taken = [n for at, _, n in sorted(gateways.puts) if consumer.is_new(("odom",), name_of(n), at)]
+    assert sorted(taken) == sorted(heard)
+    assert consumer.dropped == len(gateways.puts) - len(heard)
+
+
+def test_names_are_forgotten_after_their_time():
+    consumer = Duplicates()
+    assert consumer.is_new(("odom",), name_of(3), 0.0)
+    assert not consumer.is_new(("odom",), name_of(3), 1.9)
+    assert consumer.is_new(("scan",), name_of(3), 1.9)
+    assert consumer.is_new(("odom",), name_of(3), 4.0)
+    assert consumer.is_new(("odom",), None, 4.0)
+    assert consumer.is_new(("odom",), None, 4.0)
