@@ -5,12 +5,19 @@ only grow; `*_per_s` are means over the last `RATE_WINDOW_S`. One `Snapshot` hol
 every view renders that snapshot.
 """
 
+from typing import Annotated
+
 import msgspec
+from msgspec import Meta
 
 EVERYONE = 255
 """In the place of a robot's id: what is for everyone."""
 RATE_WINDOW_S = 5.0
 """Window in s of all rates and recent shares."""
+ONLY_GROWS = "only_grows"
+"""Marks, in the extra of a type, what counts from the daemon's start."""
+Count = Annotated[int, Meta(extra={ONLY_GROWS: True})]
+Total = Annotated[float, Meta(extra={ONLY_GROWS: True})]
 
 
 class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -28,21 +35,21 @@ class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
     """Default class of its messages: urgent | latency | default | bulk"""
     priority: int
     """Default priority of its messages within the class, 0 to 127; 127 is sent first."""
-    accepted: int = 0
+    accepted: Count = 0
     """Messages submitted, including those that were then dropped."""
     accepted_per_s: float = 0.0
     """Messages submitted per second."""
     accepted_bytes_per_s: float = 0.0
     """Payload bytes submitted per second."""
-    sent: int = 0
+    sent: Count = 0
     """Messages that have left completely."""
-    sent_bytes: int = 0
+    sent_bytes: Count = 0
     """Payload bytes of the sent messages; compressed size where the topic is compressed."""
     queued: int = 0
     """Messages in the queue of which no part has been sent yet."""
-    reoffered: int = 0
+    reoffered: Count = 0
     """Latched messages sent again to late joiners; `accepted` includes them."""
-    dropped: dict[str, int] = {}
+    dropped: dict[str, Count] = {}
     """Messages dropped, by reason (`tx_*`)."""
     lifespan_s: float | None = None
     """Default age in s after which a message is not sent any more; null: no limit."""
@@ -101,17 +108,17 @@ class ClockReport(msgspec.Struct, frozen=True, kw_only=True):
     """Largest possible error of `wall_offset_ms`, in µs."""
     period_s: float = 0.0
     """Time between its last two CLOCK records, in s."""
-    samples: int = 0
+    samples: Count = 0
     """Time stamps taken, of both directions."""
-    steps: int = 0
+    steps: Count = 0
     """How often the clock jumped."""
-    false_steps: int = 0
+    false_steps: Count = 0
     """How often the clock seemed to jump but had not; not among `steps`."""
-    contradicted: int = 0
+    contradicted: Count = 0
     """Time stamps rejected because they contradict the others."""
-    refused: int = 0
+    refused: Count = 0
     """CLOCK records rejected: of another boot, or not newer than the last one."""
-    resets: int = 0
+    resets: Count = 0
     """How often the robot restarted with another clock."""
 
 
@@ -126,15 +133,15 @@ class ReceivedTopicReport(msgspec.Struct, frozen=True, kw_only=True):
     """`/` and the topic's name in the registry; for an unknown topic, its id."""
     republished_as: str
     """Name on the bus; empty: nothing has been published yet."""
-    delivered: int = 0
+    delivered: Count = 0
     """Messages handed to the bus."""
     delivered_per_s: float = 0.0
     """Messages handed to the bus per second."""
-    delivered_bytes: int = 0
+    delivered_bytes: Count = 0
     """Payload bytes handed to the bus."""
     delivered_bytes_per_s: float = 0.0
     """Payload bytes handed to the bus per second."""
-    dropped: dict[str, int] = {}
+    dropped: dict[str, Count] = {}
     """Messages dropped, by reason (`rx_*`)."""
     pdr: float | None = None
     """Share of the messages that were delivered rather than dropped, 0 to 1; null: no messages."""
@@ -146,7 +153,7 @@ class ReceivedTopicReport(msgspec.Struct, frozen=True, kw_only=True):
     """99th percentile of the ages of the recent messages, in ms; null: unknown."""
     latency: LatencyReport | None = None
     """The parts of the age; null: no age is known."""
-    stops: int = 0
+    stops: Count = 0
     """Stop messages published because the topic fell silent."""
 
 
@@ -159,23 +166,23 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     """Whether it is this robot itself, which hears its own PDUs."""
     last_heard_s_ago: float
     """Time since its last PDU, in s."""
-    pdus_heard: int
+    pdus_heard: Count
     """PDUs heard, without duplicates."""
     pdus_lost: int
     """PDUs lost, by gaps in the PDU numbers."""
-    pdus_repaired: int = 0
+    pdus_repaired: Count = 0
     """PDUs lost at first that came when they were sent again; they are not in `pdus_lost`."""
     per: float
     """Share of its PDUs that were lost since the start, 0 to 1."""
     per_lately: float | None = None
     """Share of its PDUs that were lost in the last `RATE_WINDOW_S`, 0 to 1; null: none was sent."""
-    duplicates: int
+    duplicates: Count
     """PDUs heard again and ignored."""
     usual_gap_s: float = 0.0
     """Longest recent pause between its PDUs, in s."""
     hops_left: int
     """How many more times its last PDU may be relayed."""
-    reboots: int
+    reboots: Count
     """How often the robot restarted since it was first heard."""
     snr_db: float | None = None
     """Recent mean SNR of its PDUs, in dB; null: the PDU link measures none."""
@@ -194,9 +201,9 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
 class TxReport(msgspec.Struct, frozen=True, kw_only=True):
     """The transmit ledger: accepted = sent + queued + in_flight + every reason of `dropped`."""
 
-    accepted: int
+    accepted: Count
     """Messages that entered the ledger: submitted, refused by the bus, reoffered or relayed."""
-    sent: int
+    sent: Count
     """Messages that have left completely."""
     queued: int
     """Messages in the queue of which no part has been sent yet."""
@@ -204,21 +211,21 @@ class TxReport(msgspec.Struct, frozen=True, kw_only=True):
     """Payload bytes of the queued messages."""
     in_flight: int
     """Messages of which a part is composed and that are neither sent nor dropped yet."""
-    dropped: dict[str, int]
+    dropped: dict[str, Count]
     """Messages dropped, by reason (`tx_*`)."""
     queued_by_class: dict[str, int]
     """Queued messages by class."""
-    entries: int
+    entries: Count
     """Entries composed into PDUs."""
-    pdus_composed: int
+    pdus_composed: Count
     """PDUs composed."""
-    pdus_sent: int
+    pdus_sent: Count
     """PDUs in bursts that left."""
-    pdus_failed: int
+    pdus_failed: Count
     """PDUs in bursts that failed."""
-    bursts_sent: int
+    bursts_sent: Count
     """Bursts that left."""
-    bursts_failed: int
+    bursts_failed: Count
     """Bursts that did not leave and were given up."""
 
 
@@ -229,34 +236,34 @@ class RxReport(msgspec.Struct, frozen=True, kw_only=True):
     started = delivered + held + every reason of `dropped`.
     """
 
-    pdus_heard: int
+    pdus_heard: Count
     """PDUs received from the PDU link."""
-    pdus_used: int
+    pdus_used: Count
     """PDUs with entries for this robot."""
-    pdus_dropped: dict[str, int]
+    pdus_dropped: dict[str, Count]
     """Other PDUs, by reason (`rx_*`, `sec_*`)."""
-    started: int
+    started: Count
     """Messages of which at least one part has arrived."""
-    delivered: int
+    delivered: Count
     """Messages handed to the bus."""
     held: int
     """Incomplete messages that wait for more fragments."""
     held_bytes: int
     """Memory of the incomplete messages, in bytes."""
-    dropped: dict[str, int]
+    dropped: dict[str, Count]
     """Messages dropped, by reason (`rx_*`)."""
-    control_bad: int = 0
+    control_bad: Count = 0
     """Unreadable control entries that were skipped (rx_control_bad)."""
 
 
 class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
     """PDUs that this robot relays; each also counts as a message in the transmit ledger."""
 
-    accepted: int = 0
+    accepted: Count = 0
     """PDUs to be relayed, including those that were then dropped."""
-    sent: int = 0
+    sent: Count = 0
     """PDUs relayed."""
-    dropped: dict[str, int] = {}
+    dropped: dict[str, Count] = {}
     """PDUs dropped, by reason (`tx_*`)."""
 
 
@@ -280,7 +287,7 @@ class FlowReport(msgspec.Struct, frozen=True, kw_only=True):
     """Id of the robot that they are for; 255: everyone."""
     forwarded_by: list[int]
     """The robots that are to forward them next."""
-    went_around: int
+    went_around: Count
     """How often a robot did not answer, so that others were named."""
 
 
@@ -333,7 +340,7 @@ class AdmissionReport(msgspec.Struct, frozen=True, kw_only=True):
     """Airtime in % of all flows that are admitted."""
     flows: list[ReservedFlowReport] = []
     """The flows, in ascending order of robots and topic ids."""
-    records_ignored: int = 0
+    records_ignored: Count = 0
     """FLOWS and ADMIT records that cannot be true, or that are not from the planner."""
 
 
@@ -358,7 +365,7 @@ class SecurityReport(msgspec.Struct, frozen=True, kw_only=True):
     """Robots that are heard and have not proven it."""
     key_days_left: float | None = None
     """Days for which the key can still be used; null: no key."""
-    waits: int = 0
+    waits: Count = 0
     """How often a burst waited for numbers of sealed PDUs."""
     halted: str = ""
     """Why nothing is sent any more, as a sentence; empty: all is well."""
@@ -367,21 +374,21 @@ class SecurityReport(msgspec.Struct, frozen=True, kw_only=True):
 class RepeatReport(msgspec.Struct, frozen=True, kw_only=True):
     """Selective repeat: what was sent again, and what was asked for."""
 
-    pdus: int = 0
+    pdus: Count = 0
     """PDUs sent again."""
-    airtime_s: float = 0.0
+    airtime_s: Total = 0.0
     """Airtime of the bursts with these PDUs, in s."""
-    asked: int = 0
+    asked: Count = 0
     """PDUs asked of others, each as often as it was asked for."""
-    given_up: int = 0
+    given_up: Count = 0
     """PDUs of others that were missing for so long that nobody repeats them."""
-    asked_of_us: int = 0
+    asked_of_us: Count = 0
     """PDUs that others asked for, each as often as it was asked for."""
-    unknown: int = 0
+    unknown: Count = 0
     """Of these: never sent, not kept any more, or not for the robot that asked."""
-    expired: int = 0
+    expired: Count = 0
     """Of these: with messages that have all outlived their lifespans."""
-    refused: int = 0
+    refused: Count = 0
     """Of these: dropped as too many others waited."""
 
 
@@ -398,21 +405,21 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Why the access policy in force was chosen."""
     access_share_pct: float = 100.0
     """Share of the airtime in % that this policy can use with this radio under full load."""
-    airtime_s: float
+    airtime_s: Total
     """Airtime of all bursts that left, in s."""
     air_sent_pct: float = 0.0
     """Airtime of our bursts over the last `RATE_WINDOW_S`, in %."""
     air_heard_pct: float = 0.0
     """Airtime of the bursts heard from others over the last `RATE_WINDOW_S`, in %."""
-    airtime_by_class_s: dict[str, float] = {}
+    airtime_by_class_s: dict[str, Total] = {}
     """Airtime by the class of the PDUs, in s; includes bursts that failed."""
-    control_airtime_s: float = 0.0
+    control_airtime_s: Total = 0.0
     """Airtime of PDUs that hold only control records, in s."""
     control_period_s: float = 0.0
     """Longest time in s between PDUs that hold only CLOCK and RECEIPT records."""
-    bursts_by_mcs: dict[int, int]
+    bursts_by_mcs: dict[int, Count]
     """Bursts that left, by MCS."""
-    bursts_late: int
+    bursts_late: Count
     """How often a burst missed its slot and was put into the retry queue."""
     mcs_lowest: int | None = None
     """Slowest MCS that rate control may choose; null: the MCS is fixed."""
@@ -432,11 +439,11 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Air that flows of the team reserve."""
     repeats: RepeatReport = RepeatReport()
     """PDUs sent again, and asked for."""
-    fragments_repaired: int = 0
+    fragments_repaired: Count = 0
     """Lost fragments that were computed from parity."""
-    receipts_untold: int = 0
+    receipts_untold: Count = 0
     """RECEIPT records for others that were never sent, as too many were waiting."""
-    receipts_unasked: int = 0
+    receipts_unasked: Count = 0
     """RECEIPT records received for messages that no longer await one."""
     tx: TxReport
     """The transmit ledger."""
@@ -470,7 +477,7 @@ class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Share of the recently received samples at full scale, in %."""
     max_cfo_hz: float | None = None
     """Largest frequency offset at which the receiver searches for bursts, in Hz."""
-    counters: dict[str, int] = {}
+    counters: dict[str, Count] = {}
     """Counters of the radio and the modem by name."""
     realtime_ratio: float | None = None
     """Speed of the receiver as a multiple of real time, by CPU time; null: unknown."""
@@ -487,11 +494,11 @@ class BusReport(msgspec.Struct, frozen=True, kw_only=True):
 
     runtime_dir: str
     """Directory of the daemon's sockets."""
-    received: int
+    received: Count
     """Messages received from producers, including those that were refused."""
-    published: int
+    published: Count
     """Messages from other robots handed to consumers."""
-    control_requests: int
+    control_requests: Count
     """Requests answered on the control socket."""
     bad_envelope_last: str = ""
     """What was wrong with the last refused message; empty: none was refused."""
@@ -523,7 +530,7 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     """Time since the daemon's start, in s."""
     loop_lag_ms: float
     """Delay of the event loop's timer: the recent maximum, which decays; in ms."""
-    host_clock_steps: int = 0
+    host_clock_steps: Count = 0
     """How often this host's clock was set while the daemon ran."""
     verdict: VerdictReport = VerdictReport()
     """OK, DEGRADED or DOWN, with reasons."""

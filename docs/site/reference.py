@@ -7,7 +7,7 @@ from pathlib import Path
 import pypandoc
 import typer
 
-from sdrlinkd import __version__, manual
+from sdrlinkd import __version__, exporter, manual
 from sdrlinkd.cli import ether, gateway
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.commands import COMMANDS
@@ -31,6 +31,7 @@ def pages() -> dict[str, str]:
     return {
         "configuration": manual.configuration_page(),
         "snapshot": manual.snapshot_page(),
+        "metrics": exporter.metrics_page(),
         "python": manual.python_client_page(),
         "sdrlinkctl": manual.commands_page(
             "sdrlinkctl",

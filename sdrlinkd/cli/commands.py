@@ -40,6 +40,9 @@ COMMANDS = {
         "Show who hears whom in the team, and who forwards what goes through this robot.",
         ("routes",),
     ),
+    "exporter": Listed(
+        "Serve the figures of this host's daemons to Prometheus until Ctrl-C.", ("exporter",)
+    ),
     "check": Listed(
         "Verify the running daemon's ledger; exit code 1 when it does not add up.", ("status",)
     ),

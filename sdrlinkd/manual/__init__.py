@@ -3,6 +3,7 @@
 It turns types, commands and files into Markdown. It prints nothing and queries no daemon.
 """
 
+from sdrlinkd.manual.attributes import field_texts, summary_of
 from sdrlinkd.manual.commands import commands_page
 from sdrlinkd.manual.configuration import configuration_page
 from sdrlinkd.manual.howto import HowTo, find_how_to, how_tos
@@ -16,6 +17,7 @@ __all__ = [
     "Section",
     "commands_page",
     "configuration_page",
+    "field_texts",
     "find_how_to",
     "find_key",
     "how_tos",
@@ -23,4 +25,5 @@ __all__ = [
     "python_client_page",
     "sections",
     "snapshot_page",
+    "summary_of",
 ]

@@ -63,6 +63,8 @@ _PLAIN = {
 
 
 def _kind(kind: inspect.Type) -> str:
+    if isinstance(kind, inspect.Metadata):
+        return f"{_kind(kind.type)}, only grows"
     if type(kind) in _PLAIN:
         return _PLAIN[type(kind)]
     if isinstance(kind, inspect.ListType):

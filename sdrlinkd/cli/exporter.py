@@ -1,0 +1,52 @@
+"""`exporter`: the figures of this host's daemons for Prometheus."""
+
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sdrlinkd.cli.app import app
+from sdrlinkd.cli.listing import directories
+from sdrlinkd.errors import UserError
+
+NO_CLIENT = "the exporter needs prometheus-client: pip install 'sdrlinkd[metrics]'"
+MOST_PORT = 65535
+
+
+@app.command("exporter")
+def exporter(
+    runtime_dir: Annotated[
+        list[Path] | None,
+        typer.Option(help="Daemon to report, by its runtime directory; may be repeated; "
+                     "default: all of this host."),
+    ] = None,
+    listen: Annotated[
+        str, typer.Option(metavar="HOST:PORT", help="Where Prometheus asks.")
+    ] = "127.0.0.1:9477",
+) -> None:  # fmt: skip
+    """Serve the figures of this host's daemons to Prometheus until Ctrl-C."""
+    try:
+        from prometheus_client import CollectorRegistry, start_http_server
+
+        from sdrlinkd.exporter import Collector
+    except ModuleNotFoundError as error:
+        if error.name != "prometheus_client":
+            raise
+        raise UserError(NO_CLIENT) from None
+    host, port = _address(listen)
+    registry = CollectorRegistry()
+    registry.register(Collector((lambda: runtime_dir) if runtime_dir else directories))
+    try:
+        server, _ = start_http_server(port, host, registry)
+    except OSError as error:
+        raise UserError(f"--listen {listen}: {error.strerror}") from None
+    typer.echo(f"metrics at http://{host}:{server.server_port}/metrics")
+    threading.Event().wait()
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdecimal() or int(port) > MOST_PORT:
+        raise UserError(f'--listen: got "{text}"; allowed: HOST:PORT, such as 127.0.0.1:9477')
+    return host.strip("[]"), int(port)
