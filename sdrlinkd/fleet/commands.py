@@ -36,8 +36,8 @@ class Order:
     command: Command
     cdr: bytes
     came_at: float
-    due_at: float | None = None
-    """When this gateway sends it unless the leader says that it has; None: not to be sent."""
+    due_at: float = 0.0
+    """When this gateway sends it unless another says that it has, where it is held."""
     patience_s: float = 0.0
     """Further time to wait for other gateways, which may hear the robot better."""
 
@@ -54,6 +54,8 @@ class Commands:
     def __init__(self, own_id: int) -> None:
         self._own_id = own_id
         self._known: OrderedDict[Id, Order] = OrderedDict()
+        self._held: dict[Id, Order] = {}
+        """Those that this gateway sends when their time comes."""
         self._early: OrderedDict[Id, Fate] = OrderedDict()
         """What was said of commands that have not come here yet."""
         self._newest: OrderedDict[tuple[int, str, str], int] = OrderedDict()
@@ -81,11 +83,11 @@ class Commands:
         order = Order((*operator, number), command, cdr, now, patience_s=patience_s)
         self._known[order.id] = order
         if len(self._known) > MOST_KNOWN:
-            self._known.popitem(last=False)
+            self._drop(next(iter(self._known)))
         early = self._early.pop(order.id, None)
         if leads and early is None:
             return order
-        order.due_at = now + HOLD_S + patience_s
+        self._hold(order, now + HOLD_S + patience_s)
         if early is not None:
             self._note(order, early, now)
         return None
@@ -105,29 +107,33 @@ class Commands:
 
     def due(self, now: float) -> list[Order]:
         """The commands that no other gateway has taken in time."""
-        found = []
-        for order in self._known.values():
-            if order.due_at is not None and order.due_at <= now:
-                order.due_at = None
-                if now < order.until:
-                    found.append(order)
-        return found
+        due = [each for each in self._held.values() if each.due_at <= now]
+        for order in due:
+            del self._held[order.id]
+        return [each for each in due if now < each.until]
 
     @property
     def due_at(self) -> float:
         """When `due` has something next, in s."""
-        times = (each.due_at for each in self._known.values() if each.due_at is not None)
-        return min(times, default=float("inf"))
+        return min((each.due_at for each in self._held.values()), default=float("inf"))
 
     def _note(self, order: Order, fate: Fate, now: float) -> None:
         if fate.fate in _FAILED:
-            order.due_at = now + order.patience_s
+            self._hold(order, now + order.patience_s)
         else:
-            order.due_at = None
+            self._held.pop(order.id, None)
+
+    def _hold(self, order: Order, until: float) -> None:
+        order.due_at = until
+        self._held[order.id] = order
+
+    def _drop(self, id_: Id) -> None:
+        del self._known[id_]
+        self._held.pop(id_, None)
 
     def _forget(self, now: float) -> None:
         while self._known:
             first = next(iter(self._known.values()))
             if now < first.came_at + KEPT_S:
                 break
-            del self._known[first.id]
+            self._drop(first.id)

@@ -6,7 +6,15 @@ from collections.abc import Callable
 
 import msgspec
 
-from sdrlinkd.client import AsyncSubscriber, ControlClient, Message, NoDaemonError, RefusedError
+from sdrlinkd.client import (
+    AsyncSubscriber,
+    ControlClient,
+    EnvelopeMismatchError,
+    Message,
+    NoDaemonError,
+    RefusedError,
+)
+from sdrlinkd.errors import UserError
 from sdrlinkd.reports import Snapshot
 
 POLL_S = 0.5
@@ -24,7 +32,10 @@ class DaemonSide:
         """The daemon's last report; None while it does not answer."""
 
     async def listen(self, take: Callable[[Message], None]) -> None:
-        """Call `take` for each message from the air; waits for the daemon if it is away."""
+        """Call `take` for each message from the air; waits for the daemon if it is away.
+
+        Raises UserError.
+        """
         is_told = False
         while True:
             try:
@@ -38,14 +49,19 @@ class DaemonSide:
                     _log.warning("%s; waiting for it", error)
                 is_told = True
                 await asyncio.sleep(POLL_S)
+            except EnvelopeMismatchError as error:
+                raise UserError(str(error)) from None
 
     async def look(self, see: Callable[[Snapshot | None], None]) -> None:
-        """Call `see` with the daemon's report twice a second; with None while it is away."""
+        """Call `see` with the daemon's report twice a second.
+
+        With None while it is away, or of another version.
+        """
         while True:
             try:
                 answer = await asyncio.to_thread(self._ask, "status", None)
                 self.snapshot = msgspec.convert(answer, Snapshot)
-            except (NoDaemonError, RefusedError):
+            except (NoDaemonError, RefusedError, msgspec.ValidationError):
                 self.snapshot = None
             see(self.snapshot)
             await asyncio.sleep(POLL_S)

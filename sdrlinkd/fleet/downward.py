@@ -128,6 +128,14 @@ class DownwardCommands:
 
     async def follow(self, directory: str | None) -> None:
         """Stay connected to the daemon, and pass on what becomes of commands."""
+        while True:
+            try:
+                await self._follow(directory)
+            except NoDaemonError:
+                self._publisher = None
+                await asyncio.sleep(LOOK_S)
+
+    async def _follow(self, directory: str | None) -> None:
         async with AsyncPublisher(runtime_dir=directory) as publisher:
             self._publisher = publisher
             while True:

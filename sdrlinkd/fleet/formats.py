@@ -3,6 +3,7 @@
 All of it comes from a network: what cannot be read is None, never an exception.
 """
 
+from math import isnan
 from typing import Annotated, TypeVar
 
 import msgspec
@@ -61,7 +62,7 @@ class Claim(msgspec.Struct, frozen=True):
 
     gw: Gateway
     term: Number
-    score: float
+    score: Annotated[float, Meta(ge=-1, le=2)]
 
     @property
     def rank(self) -> tuple[int, float, int]:
@@ -112,7 +113,7 @@ def read_claim(payload: bytes) -> Claim | None:
     """A gateway's claim."""
     claim = _read(_claim, payload)
     # NaN would be neither better nor worse than any other.
-    return claim if claim is not None and claim.score == claim.score else None
+    return None if claim is None or isnan(claim.score) else claim
 
 
 def read_fate(payload: bytes) -> Fate | None:

@@ -10,6 +10,7 @@ import msgspec
 
 from sdrlinkd.client import Message
 from sdrlinkd.config import Setup
+from sdrlinkd.errors import UserError
 from sdrlinkd.fleet.commands import Order
 from sdrlinkd.fleet.daemon_side import DaemonSide
 from sdrlinkd.fleet.downward import DownwardCommands
@@ -286,5 +287,11 @@ async def run_gateway(setup: Setup, folder: Path) -> None:
     session = await open_session(setup.config.fleet, folder)
     try:
         await Gateway(setup, session).run()
+    except ExceptionGroup as group:
+        # A task group wraps even a single error.
+        mistakes, others = group.split(UserError)
+        if mistakes is None or others is not None:
+            raise
+        raise mistakes.exceptions[0] from None
     finally:
         await session.close()

@@ -158,7 +158,11 @@ class Session:
         return end
 
     def _answer(self, query: zenoh.Query, answers: Callable[[str], Iterable[Answer]]) -> None:
-        found = list(answers(str(query.key_expr)))
+        try:
+            found = list(answers(str(query.key_expr)))
+        except BaseException:
+            self._queries -= 1
+            raise
 
         def reply() -> None:
             try:
@@ -191,7 +195,8 @@ class Session:
             # The last one stays until it has run, so that `_post` does not call this again.
             actions.append(self._waiting[0])
         for action in actions:
-            action()
+            # By the loop, so that one that fails is logged and does not stop the others.
+            self._loop.call_soon(action)
         with self._lock:
             self._waiting.popleft()
             is_more = bool(self._waiting)

@@ -182,3 +182,16 @@ def test_nothing_goes_down_over_an_open_network(start_daemon, tmp_path):
     with Process(module("sdrlinkd.cli.gateway", "--config", daemon.config)) as process:
         assert process.wait() == 2
         assert "is open to everybody on the network; use tls/ endpoints" in process.err()
+
+
+async def test_a_storm_of_queries_is_bounded_and_passes(start_fleet):
+    fleet = start_fleet()
+    key, session = f"sdrlink/mine/@gw/{FIRST}/status", fleet.router.session
+    answers = [session.get(key, timeout=10) for _ in range(1000)]
+    told = [reply.ok is not None for each in answers for reply in each]
+    assert len(told) == 1000
+    assert told.count(True) >= 64
+    report = fleet.report(FIRST)
+    assert report.queries_refused == told.count(False)
+    await published(fleet, 20)
+    await asyncio.to_thread(wait_for, lambda: fleet.report(FIRST).up_taken == 20)
