@@ -53,6 +53,14 @@ ROWS = {
         "images_delivered_2pct_random_pct",
         "urgent_lost_twice_pct",
     },
+    "fleet": {
+        *(
+            f"{each}_{n}_gateways" for n in (2, 3)
+            for each in ("pdr", "lost_by", "twice", "added_ms_p50", "added_ms_p99")
+        ),
+        "hand_over_gap_s", "router_killed_s", "gateway_killed_s",
+        "lost_50_robots", "twice_50_robots", "router_cpu_pct",
+    },
     "team": {
         "chain3_seed_mdr_laser", "chain3_seed_mdr_image", "chain3_seed_mdr_joystick",
         "chain3_seed_laser_D_ms", "chain3_seed_joystick_D_ms",

@@ -29,6 +29,9 @@ BENCHMARKS: dict[str, Benchmark] = {
     "team": Benchmark(
         "Teams on one channel: hops, crowds, worst cases, and how soon routes heal.", 40
     ),
+    "fleet": Benchmark(
+        "Gateways over Zenoh: several that hear one robot, many robots, and what fails.", 3,
+    ),
     "modem_path": Benchmark("The modem in a daemon: latency, and speed relative to real time.", 2),
     "realtime": Benchmark("Whole daemons in real time: latency, ages, load and start.", 8),
     "waterfall": Benchmark("Where a message's time goes in a daemon, stage by stage.", 1),

@@ -27,6 +27,8 @@ class _Known(Generic[T]):
     heard_at: float | None = None
     passed_at: float | None = None
     """When another gateway's put came."""
+    is_led: bool = False
+    """Whether that was the leader's."""
     is_put: bool = False
     item: T | None = None
     """What is held of it."""
@@ -43,6 +45,8 @@ class Forwarding(Generic[T]):
         self._held: deque[tuple[float, _Known[T]]] = deque()
         self._delays: deque[float] = deque(maxlen=REMEMBERED)
         self.hold_s = FIRST_HOLD_S
+        self.rank = 0
+        """Gateways besides the leader that put before this one what the leader missed."""
         self.left_to_others = 0
         """Messages that another gateway put."""
         self.put_for_others = 0
@@ -68,34 +72,42 @@ class Forwarding(Generic[T]):
         else:
             known.heard_at = now
             if known.passed_at is not None:
-                self._learn(now, known.passed_at)
+                if known.is_led:
+                    self._learn(now, known.passed_at)
                 self.left_to_others += 1
                 return None
         if leads:
             known.is_put = True
             return item
         known.item = item
-        self._held.append((now + self.hold_s, known))
+        self._held.append((now + self.hold_s * (1 + self.rank), known))
         return None
 
-    def passed(self, key: Hashable, name: MessageName | None, now: float) -> None:
-        """Note that another gateway has put a message."""
+    def passed(
+        self, key: Hashable, name: MessageName | None, now: float, *, by_leader: bool
+    ) -> None:
+        """Note that another gateway has put a message.
+
+        Delays are learnt from the leader alone: the others have waited for it.
+        """
         if name is None:
             return
         at: Key = (key,)
         known = self._known.find(at, name, now)
         if known is None:
-            self._known.add(at, name, _Known(passed_at=now), now)
+            self._known.add(at, name, _Known(passed_at=now, is_led=by_leader), now)
             return
         if known.passed_at is not None:
             return
         known.passed_at = now
         if known.heard_at is None:
             return
-        self._learn(known.heard_at, now)
+        if by_leader:
+            self._learn(known.heard_at, now)
         if known.is_put:
             self.put_twice += 1
-            self.hold_s = min(MOST_HOLD_S, 2 * self.hold_s)
+            if by_leader:
+                self.hold_s = min(MOST_HOLD_S, 2 * self.hold_s)
         elif known.item is not None:
             known.item = None
             self.left_to_others += 1

@@ -19,6 +19,7 @@ from sdrlinkd.fleet.formats import encode, read_claim
 from sdrlinkd.fleet.forwarding import Forwarding
 from sdrlinkd.fleet.heard_robot import HeardRobot
 from sdrlinkd.fleet.keys import Keys
+from sdrlinkd.fleet.other_gateways import OtherGateways
 from sdrlinkd.fleet.report import DOWN, UP, Counts, GatewayReport, RobotHeard
 from sdrlinkd.fleet.session import Answer, Sample, Session, open_session
 from sdrlinkd.fleet.upward import SETTLED_S, UpwardMessages
@@ -48,7 +49,7 @@ class Gateway:
         self._fleet = params.name
         self._keys = Keys(params.name)
         self._robots: dict[int, HeardRobot] = {}
-        self._others: set[int] = set()
+        self._others = OtherGateways(self._own_id)
         self._classes: dict[str, str] = {}
         """Class of each topic, by its name on the air."""
         self._counts = Counts()
@@ -91,7 +92,7 @@ class Gateway:
             fleet=self._fleet,
             is_reached=self._session.is_reached,
             has_daemon=self._daemon.snapshot is not None,
-            others=sorted(self._others),
+            others=self._others.ids,
             robots=[
                 RobotHeard(
                     robot=robot.id,
@@ -161,8 +162,8 @@ class Gateway:
         if told is None or told[0] == self._own_id:
             return
         gateway, robot = told
+        self._others.note(gateway, robot, is_there=is_there)
         if robot is None:
-            (self._others.add if is_there else self._others.discard)(gateway)
             _log.info("gateway %d %s", gateway, "is there" if is_there else "has gone")
         if not is_there:
             now = _now()
@@ -227,7 +228,8 @@ class Gateway:
 
     def _lead(self, robot: HeardRobot, now: float) -> None:
         """Do this gateway's part in the election for a robot."""
-        led = robot.election.leads
+        led, leader = robot.election.leads, robot.election.leader
+        robot.forwarding.rank = self._others.rank(robot.id, leader)
         claim = robot.election.poll(now)
         if claim is not None:
             self._session.put(self._keys.route(robot.id), encode(claim), None, "urgent")

@@ -71,7 +71,8 @@ class UpwardMessages:
         if kept is not None and passed.name is not None and kept[1].name == passed.name:
             self._missed.discard(sample.key)
         before = robot.forwarding.left_to_others
-        robot.forwarding.passed((sample.key, passed.sr), passed.name, now)
+        is_led = passed.gw == robot.election.leader
+        robot.forwarding.passed((sample.key, passed.sr), passed.name, now, by_leader=is_led)
         self._counts.move("up_held", "up_left", robot.forwarding.left_to_others - before)
 
     def put_due(self, robot: HeardRobot, now: float, *, all_held: bool = False) -> None:

@@ -8,10 +8,10 @@ import msgspec
 import pytest
 import zenoh
 
+from benchmarks.fleet.pdu_air import PduAir
 from sdrlinkd.config import FleetParams
 from sdrlinkd.fleet import GatewayReport
 from sdrlinkd.process import Process, module
-from tests.fleet.pdu_air import PduAir
 from tests.waiting import wait_for
 
 ROBOT, FIRST, SECOND = 2, 7, 8

@@ -22,6 +22,8 @@ class Gateways:
         self.leader = leader
         self.now = 0.0
         self.each = [Forwarding() for _ in heard_of]
+        for gateway, forwarding in enumerate(self.each):
+            forwarding.rank = max(0, gateway - 1) if leader == 0 else gateway
         self.puts = []
         """(time, gateway, message)."""
         self._in_flight = []
@@ -31,8 +33,9 @@ class Gateways:
             self.now += STEP_S
             arrived = [each for each in self._in_flight if each[0] <= self.now]
             self._in_flight = [each for each in self._in_flight if each[0] > self.now]
-            for _, gateway, number in arrived:
-                self.each[gateway].passed("odom", name_of(number), self.now)
+            for _, gateway, src, number in arrived:
+                is_led = src == self.leader
+                self.each[gateway].passed("odom", name_of(number), self.now, by_leader=is_led)
             for gateway, forwarding in enumerate(self.each):
                 for number in forwarding.due(self.now):
                     self.put(gateway, number)
@@ -41,7 +44,7 @@ class Gateways:
         self.puts.append((self.now, src, number))
         for gateway in range(len(self.each)):
             if gateway != src:
-                self._in_flight.append((self.now + self.delay_s(), gateway, number))
+                self._in_flight.append((self.now + self.delay_s(), gateway, src, number))
 
     def send(self, number, rng):
         heard = [gw for gw, p in enumerate(self.heard_of) if rng.random() < p]
@@ -102,6 +105,14 @@ def test_a_copy_is_held_for_longer_where_the_leader_is_far():
     twice = len(gateways.puts) - len({number for *_, number in gateways.puts})
     assert twice <= 20
     assert twice == gateways.each[1].put_twice
+
+
+def test_those_that_wait_for_the_leader_do_not_learn_from_each_other():
+    rng = Random(6)
+    gateways = Gateways([0.7, 0.8, 0.8, 0.8], lambda: rng.uniform(0.0002, 0.001))
+    heard = run(gateways, 1500)
+    assert all(each.hold_s <= 0.003 for each in gateways.each[1:])
+    assert len(gateways.puts) == len(heard), "in order, so each sees the put before"
 
 
 def test_without_a_leader_nothing_is_lost():

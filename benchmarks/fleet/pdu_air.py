@@ -3,7 +3,11 @@
 import selectors
 import socket
 import threading
+from collections.abc import Collection
 from random import Random
+from typing import Self
+
+MOST_OCTETS = 4096
 
 
 class PduAir:
@@ -12,11 +16,11 @@ class PduAir:
     `loss[src, dst]` is the share of PDUs from `src` that `dst` does not hear, 0 by default.
     """
 
-    def __init__(self, robots, seed=1):
-        self.loss = {}
+    def __init__(self, robots: Collection[int], seed: int = 1) -> None:
+        self.loss: dict[tuple[int, int], float] = {}
         self._rng = Random(seed)
-        self._sockets = {}
-        self._daemons = {}
+        self._sockets: dict[int, socket.socket] = {}
+        self._daemons: dict[int, tuple[str, int]] = {}
         """Address of each robot's daemon, from its first PDU on."""
         self._selector = selectors.DefaultSelector()
         for robot in robots:
@@ -25,13 +29,12 @@ class PduAir:
             bound.bind(("127.0.0.1", 0))
             self._sockets[robot] = bound
             self._selector.register(bound, selectors.EVENT_READ, robot)
-        self._wake, woken = socket.socketpair()
-        self._selector.register(woken, selectors.EVENT_READ, None)
-        self._woken = woken
-        self._thread = threading.Thread(target=self._run)
+        self._wake, self._woken = socket.socketpair()
+        self._selector.register(self._woken, selectors.EVENT_READ, None)
+        self._thread = threading.Thread(target=self._run, name="air")
         self._thread.start()
 
-    def settings(self, robot):
+    def settings(self, robot: int) -> str:
         """The TOML of a robot's daemon for this air."""
         port = self._sockets[robot].getsockname()[1]
         return (
@@ -39,22 +42,29 @@ class PduAir:
             "[link]\nbeacon_s = 0.2\n"
         )
 
-    def close(self):
+    def close(self) -> None:
+        """Carry nothing any more."""
         self._wake.send(b".")
         self._thread.join()
         for each in (*self._sockets.values(), self._wake, self._woken):
             each.close()
         self._selector.close()
 
-    def _run(self):
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _run(self) -> None:
         while True:
             for found, _ in self._selector.select():
                 if found.data is None:
                     return
-                pdu, self._daemons[found.data] = self._sockets[found.data].recvfrom(4096)
+                pdu, self._daemons[found.data] = self._sockets[found.data].recvfrom(MOST_OCTETS)
                 self._carry(found.data, pdu)
 
-    def _carry(self, src, pdu):
+    def _carry(self, src: int, pdu: bytes) -> None:
         for dst, address in self._daemons.items():
             if dst != src and self._rng.random() >= self.loss.get((src, dst), 0.0):
                 self._sockets[dst].sendto(pdu, address)

@@ -1,0 +1,1 @@
+"""Gateways over Zenoh, beside what their robots' daemons hear: `python -m benchmarks.fleet`."""

@@ -1,0 +1,92 @@
+"""A robot, gateways that hear it, and a Zenoh router, as separate programs."""
+
+import socket
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks import processes
+from benchmarks.daemons import is_up, running
+from benchmarks.fleet.pdu_air import PduAir
+from sdrlinkd.config import FleetParams
+from sdrlinkd.process import Process
+
+ROBOT = 2
+FLEET = "bench"
+GUARD = (
+    '{access_control: {enabled: true, default_permission: "allow", rules: [], subjects: [], '
+    "policies: []}}"
+)
+"""Rules of Zenoh that let everything pass: on this machine alone, commands are safe."""
+
+
+@dataclass
+class Field:
+    """What runs; `gateways` are the processes by robot id."""
+
+    air: PduAir
+    endpoint: str
+    folders: dict[int, Path]
+    gateways: dict[int, Process]
+    router: Process
+
+    @property
+    def params(self) -> FleetParams:
+        """What an operator's program needs to join."""
+        return FleetParams(name=FLEET, connect=[self.endpoint])
+
+
+def free_endpoint() -> str:
+    """A TCP endpoint at which nobody listens."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+
+
+@contextmanager
+def routed(endpoint: str) -> Iterator[Process]:
+    """A Zenoh router at an endpoint."""
+    with ExitStack() as stack:
+        router = processes.start_module(stack, "router", "benchmarks.fleet.router", endpoint)
+        router.line()
+        yield router
+
+
+@contextmanager
+def field(losses: Mapping[int, float], seed: int) -> Iterator[Field]:
+    """Run the robot's daemon, and for each gateway, which loses so much of it, both its programs.
+
+    Raises PeerError.
+    """
+    endpoint = free_endpoint()
+    robots = [ROBOT, *losses]
+    with PduAir(robots, seed) as air, ExitStack() as stack:
+        guard = stack.enter_context(_file(GUARD))
+        fleet = (
+            f'[fleet]\nname = "{FLEET}"\nconnect = ["{endpoint}"]\nzenoh = "{guard}"\n'
+            'down = ["cmd_vel"]\n'
+        )
+        own = {robot: air.settings(robot) + fleet for robot in robots}
+        router = stack.enter_context(routed(endpoint))
+        started = stack.enter_context(
+            running("gnuradio", robots, ["odom", "cmd_vel"], "", "", own=own, ready=is_up)
+        )
+        air.loss = {(ROBOT, gateway): loss for gateway, loss in losses.items()}
+        gateways = {}
+        for gateway in losses:
+            config = started.folders[gateway].with_suffix(".toml")
+            gateways[gateway] = processes.start_module(
+                stack, f"gateway_{gateway}", "sdrlinkd.cli.gateway", "--config", str(config)
+            )
+        yield Field(air, endpoint, started.folders, gateways, router)
+
+
+@contextmanager
+def _file(text: str) -> Iterator[Path]:
+    from tempfile import NamedTemporaryFile
+
+    with NamedTemporaryFile("w", suffix=".json5") as file:
+        file.write(text)
+        file.flush()
+        yield Path(file.name)
