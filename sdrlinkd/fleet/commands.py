@@ -13,12 +13,11 @@ KEPT_S = 5.0
 MOST_KNOWN = 4096
 MOST_OPERATORS = 256
 TAKEN = "taken"
-DELIVERED = "delivered"
 _FAILED = ("unknown", "dropped")
 DEFAULT_LIFESPAN_S = 1.0
 
-Id = tuple[int, str, str, int]
-"""(robot, topic, operator, number) of a command."""
+Id = tuple[int, str, str, int | None]
+"""(robot, topic, operator, number or None) of a command."""
 
 
 class Refusal(Enum):
@@ -71,7 +70,7 @@ class Commands:
         operator, number = (robot, topic, command.op), command.n
         self._forget(now)
         if number is None:
-            return Order((*operator, 0), command, cdr, now) if leads else None
+            return Order((*operator, None), command, cdr, now) if leads else None
         if (*operator, number) in self._known:
             return Refusal.AGAIN
         if number < self._newest.get(operator, -1):
@@ -94,7 +93,7 @@ class Commands:
 
     def told(self, robot: int, fate: Fate, now: float) -> None:
         """Take what another gateway says of a command."""
-        if fate.gw == self._own_id:
+        if fate.gw == self._own_id or fate.n is None:
             return
         id_ = (robot, fate.topic, fate.op, fate.n)
         order = self._known.get(id_)

@@ -2,6 +2,7 @@
 
 import asyncio
 import fnmatch
+import time
 from collections.abc import Awaitable, Callable
 
 from sdrlinkd.client import (
@@ -18,6 +19,8 @@ from sdrlinkd.fleet.report import Counts
 from sdrlinkd.fleet.session import Sample, Session
 
 LOOK_S = 0.5
+MOST_WAIT_S = 1.0
+"""Longest time in s that a command waits for a daemon that is busy or away."""
 BACK_OFF_S = 0.05
 """The worse a gateway hears a robot, the longer it waits for others, at most this much more."""
 
@@ -90,8 +93,8 @@ class DownwardCommands:
         self._counts.add("down_left", -len(due))
         return due
 
-    async def send(self, order: Order) -> None:
-        """Hand a command to the daemon, and say so."""
+    async def send(self, order: Order, now: float) -> None:
+        """Hand a command to the daemon, and say so. Its age counts from when it came here."""
         robot, topic, _, _ = order.id
         command, publisher = order.command, self._publisher
         if publisher is None:
@@ -100,11 +103,13 @@ class DownwardCommands:
             return
         self._say(order.id, TAKEN)
         name = self._bus_name(topic)
+        came_ns = time.time_ns() - round(1e9 * (now - order.came_at))
+        wait_s = min(MOST_WAIT_S, max(0.0, order.until - now))
 
         async def send() -> str | bool | None:
             return await publisher.send(
                 name, order.cdr, qos=command.q or None, dst=robot, lifespan_ms=command.ls,
-                type=command.ty or None, receipt=True,
+                type=command.ty or None, published_ns=came_ns, receipt=True, timeout_s=wait_s,
             )  # fmt: skip
 
         try:

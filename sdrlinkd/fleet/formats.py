@@ -4,7 +4,7 @@ All of it comes from a network: what cannot be read is None, never an exception.
 """
 
 from math import isnan
-from typing import Annotated, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 import msgspec
 from msgspec import Meta
@@ -53,7 +53,7 @@ class Command(msgspec.Struct, frozen=True, omit_defaults=True):
     op: Annotated[str, Meta(max_length=32)] = ""
     n: Number | None = None
     ty: Text = ""
-    q: str = ""
+    q: Literal["", "urgent", "latency", "default", "bulk"] = ""
     ls: Annotated[float, Meta(gt=0)] | None = None
 
 
@@ -76,7 +76,7 @@ class Fate(msgspec.Struct, frozen=True, omit_defaults=True):
     gw: Gateway
     topic: Text
     op: Text
-    n: Number
+    n: Number | None
     fate: Text
     reason: Text = ""
 

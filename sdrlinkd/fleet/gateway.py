@@ -257,7 +257,7 @@ class Gateway:
         self._set_alarm()
 
     def _spawn(self, order: Order) -> None:
-        task = asyncio.get_running_loop().create_task(self._down.send(order))
+        task = asyncio.get_running_loop().create_task(self._down.send(order, _now()))
         self._sending.add(task)
         task.add_done_callback(self._sending.discard)
 

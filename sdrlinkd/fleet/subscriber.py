@@ -6,7 +6,7 @@ import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 from sdrlinkd.config import FleetParams
 from sdrlinkd.fleet.formats import Command, Fate, Passed, encode, read_fate, read_passed
@@ -15,6 +15,7 @@ from sdrlinkd.fleet.names import Duplicates
 from sdrlinkd.fleet.session import Sample, Session, open_session
 
 MOST_WAITING = 4096
+Qos = Literal["", "urgent", "latency", "default", "bulk"]
 
 
 class FleetMessage(NamedTuple):
@@ -78,12 +79,13 @@ class FleetClient:
             yield await self.receive()
 
     def command(
-        self, robot: int, topic: str, cdr: bytes, *, kind: str = "", qos: str = "",
+        self, robot: int, topic: str, cdr: bytes, *, kind: str = "", qos: Qos = "",
         lifespan_ms: float | None = None,
     ) -> int:  # fmt: skip
         """Send a command to a robot; returns its number, which `on_fate` gets with its fate.
 
-        `kind` is its type, needed for topics that the gateway's daemon does not know.
+        `kind` is its type, needed for topics that the gateway's daemon does not know. `qos` is a
+        class, by default that of the topic.
         """
         if self._session is None:
             raise RuntimeError("enter the client with `async with` first")

@@ -121,7 +121,7 @@ def _passed(own_id: int, message: Message) -> Passed:
     told = Passed(
         gw=own_id, ty=message.type, sr=message.series, age=message.age_us, sn=message.snr_db,
         tl=message.published_ns, eb=message.published_error_us, h=message.hops_left,
-        stop=message.is_stop,
+        stop=message.is_stop, again=message.is_late,
     )  # fmt: skip
     name = message.name
     if name is None:
@@ -136,4 +136,4 @@ def _passed(own_id: int, message: Message) -> Passed:
 def _aged(passed: Passed, by_s: float, *, again: bool = False) -> Passed:
     """The attachment of a message that has grown older since the daemon handed it over."""
     age = None if passed.age is None else passed.age + round(1e6 * by_s)
-    return msgspec.structs.replace(passed, age=age, again=again)
+    return msgspec.structs.replace(passed, age=age, again=again or passed.again)

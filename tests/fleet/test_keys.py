@@ -65,6 +65,8 @@ def test_a_message_of_a_gateway_is_no_command():
     assert not is_passed(encode(Command("desk", 3)))
     assert not is_passed(None)
     assert read_command(None) == read_command(b"") == Command()
+    assert read_command(encode(Command("desk", 3, q="soon"))) is None
+    assert read_command(encode(Command("desk", 3, ls=-1.0))) is None
 
 
 def test_the_name_of_a_message_of_a_source_that_told_no_numbers():
