@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks import processes
 from benchmarks.fleet.drive import SETTLED_S, drive, message, number_of
-from benchmarks.fleet.field import ROBOT, Field, field
+from benchmarks.fleet.field import ROBOT, ROUTER, Field, field
 from benchmarks.report import Row
 from sdrlinkd.client import Subscriber
 from sdrlinkd.fleet import FleetClient
@@ -34,7 +34,9 @@ def _router_killed(seed: int, n: int) -> Row:
         def fail(number: int) -> None:
             if number == n // 2:
                 where.router.kill()
-                processes.start_module(stack, "router", "benchmarks.fleet.router", where.endpoint)
+                processes.start_module(
+                    stack, "router", "benchmarks.peers.zenoh_router", where.endpoint
+                )
 
         found = asyncio.run(drive(where, n, PERIOD_S, fail))
     came = sorted(at[0] for at in found.at_operator.values())

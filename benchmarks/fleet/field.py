@@ -14,6 +14,7 @@ from sdrlinkd.process import Process
 
 ROBOT = 2
 FLEET = "bench"
+ROUTER = "benchmarks.peers.zenoh_router"
 GUARD = (
     '{access_control: {enabled: true, default_permission: "allow", rules: [], subjects: [], '
     "policies: []}}"
@@ -48,7 +49,7 @@ def free_endpoint() -> str:
 def routed(endpoint: str) -> Iterator[Process]:
     """A Zenoh router at an endpoint."""
     with ExitStack() as stack:
-        router = processes.start_module(stack, "router", "benchmarks.fleet.router", endpoint)
+        router = processes.start_module(stack, "router", ROUTER, endpoint)
         router.line()
         yield router
 

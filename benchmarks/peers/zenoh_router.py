@@ -1,4 +1,4 @@
-"""A Zenoh router in a process of its own: `python -m benchmarks.fleet.router ENDPOINT`."""
+"""A Zenoh router in a process of its own: `python -m benchmarks.peers.zenoh_router ENDPOINT`."""
 
 import json
 import sys
