@@ -34,9 +34,7 @@ def _router_killed(seed: int, n: int) -> Row:
         def fail(number: int) -> None:
             if number == n // 2:
                 where.router.kill()
-                processes.start_module(
-                    stack, "router", "benchmarks.peers.zenoh_router", where.endpoint
-                )
+                processes.start_module(stack, "router", ROUTER, where.endpoint)
 
         found = asyncio.run(drive(where, n, PERIOD_S, fail))
     came = sorted(at[0] for at in found.at_operator.values())
