@@ -39,13 +39,14 @@ class Drive:
         """Share of the messages that a gateway did not hear."""
         return 1 - len(self.at_gateways[gateway]) / len(self.sent_at)
 
+    def first_at(self, number: int) -> float:
+        """When a message that was heard came to the first gateway's consumers."""
+        return min(each[number] for each in self.at_gateways.values() if number in each)
+
     def added_ms(self) -> list[float]:
-        """How much later than at the first gateway's consumers each message was at the operator."""
-        first = {
-            number: min(each[number] for each in self.at_gateways.values() if number in each)
-            for number in self.heard
-        }
-        return [1e3 * (at[0] - first[n]) for n, at in self.at_operator.items() if n in first]
+        """How much later than there each message was at the operator, in the order of sending."""
+        both = sorted(self.heard & set(self.at_operator))
+        return [1e3 * (self.at_operator[number][0] - self.first_at(number)) for number in both]
 
 
 def message(number: int, size: int = SIZE) -> bytes:
