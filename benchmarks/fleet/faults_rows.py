@@ -1,7 +1,6 @@
 """What fails, and how soon messages and commands come again."""
 
 import asyncio
-import contextlib
 import threading
 import time
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks import processes
+from benchmarks.absent import PeerError
 from benchmarks.fleet.drive import SETTLED_S, drive, message, number_of
 from benchmarks.fleet.field import ROBOT, ROUTER, Field, field
 from benchmarks.report import Row
@@ -69,17 +69,18 @@ async def _commands(where: Field, n: int) -> list[float]:
 
     thread = threading.Thread(target=listen)
     thread.start()
-    leaders: set[int] = set()
-    with contextlib.suppress(asyncio.CancelledError):
-        async with FleetClient(where.params) as operator:
-            operator.on_fate = lambda _, fate: leaders.add(fate.gw)
-            await asyncio.sleep(SETTLED_S)
-            for number in range(n):
-                if number == n // 2:
-                    where.gateways[min(leaders, default=7)].kill()
-                operator.command(ROBOT, "cmd_vel", message(number, 64), lifespan_ms=500)
-                await asyncio.sleep(PERIOD_S)
-            await asyncio.sleep(1.0)
+    senders: list[int] = []
+    async with FleetClient(where.params) as operator:
+        operator.on_fate = lambda _, fate: senders.append(fate.gw)
+        await asyncio.sleep(SETTLED_S)
+        for number in range(n):
+            if number == n // 2:
+                if not senders:
+                    raise PeerError("no gateway has sent a command")
+                where.gateways[senders[-1]].kill()
+            operator.command(ROBOT, "cmd_vel", message(number, 64), lifespan_ms=500)
+            await asyncio.sleep(PERIOD_S)
+        await asyncio.sleep(1.0)
     is_over.set()
     thread.join()
     return [b - a for (a, _), (b, _) in pairwise(came)]

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 from benchmarks import processes
 from benchmarks.daemons import is_up, running
@@ -85,8 +86,6 @@ def field(losses: Mapping[int, float], seed: int) -> Iterator[Field]:
 
 @contextmanager
 def _file(text: str) -> Iterator[Path]:
-    from tempfile import NamedTemporaryFile
-
     with NamedTemporaryFile("w", suffix=".json5") as file:
         file.write(text)
         file.flush()

@@ -22,8 +22,8 @@ from sdrlinkd.adapters import (
     paced,
     summarise,
 )
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import RuntimeDir, app, connect
-from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import MessageRefusedError, Publisher
 from sdrlinkd.errors import BagError, UserError
 from sdrlinkd.reports import TopicReport

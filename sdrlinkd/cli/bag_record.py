@@ -15,11 +15,11 @@ from rich.console import Console
 from rich.live import Live
 
 from sdrlinkd.adapters import BagWriter, Recorded, cdr_from_fields
+from sdrlinkd.asking import ask_status
 from sdrlinkd.bus import SENT_TAP, fields_of
 from sdrlinkd.cli.app import RuntimeDir, connect
 from sdrlinkd.cli.bag import bags
 from sdrlinkd.cli.completion import heard_names
-from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import OUT_SOCKET, Message, NoDaemonError, Subscriber, endpoint
 from sdrlinkd.client import runtime_dir as find_runtime_dir
 from sdrlinkd.units import octets

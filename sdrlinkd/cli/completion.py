@@ -5,6 +5,7 @@ from collections.abc import Callable
 import msgspec
 import typer
 
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import connect
 from sdrlinkd.cli.fields import SHORT, paths
 from sdrlinkd.client import NoDaemonError, RefusedError
@@ -64,6 +65,6 @@ def _begun(values: "tuple[str, ...] | list[str]", incomplete: str) -> list[str]:
 def _snapshot(context: typer.Context) -> Snapshot | None:
     try:
         with connect(context.params.get("runtime_dir"), PATIENCE_S) as control:
-            return msgspec.convert(control.ask("status"), Snapshot)
+            return ask_status(control)
     except (NoDaemonError, RefusedError, UserError, OSError):
         return None

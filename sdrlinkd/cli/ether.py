@@ -1,7 +1,6 @@
 """`sdrlink-ether`: the hub of a simulated air."""
 
 import signal
-import sys
 import tempfile
 from pathlib import Path
 from typing import Annotated
@@ -13,9 +12,8 @@ from backends import Scheduling
 from sdrlinkd import __version__
 from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario, scenario_names
-from sdrlinkd.errors import UserError
+from sdrlinkd.cli.programs import run_program
 from sdrlinkd.lab import find_scenario, make_hub
-from sdrlinkd.parent import end_with_parent
 
 DEFAULT_DIRECTORY = Path(tempfile.gettempdir()) / "sdrlink-ether"
 
@@ -73,12 +71,7 @@ def ether(
 
 def main() -> None:
     """Run the hub; the exit code is 2 for errors that a person can fix."""
-    end_with_parent()
-    try:
-        app(prog_name="sdrlink-ether")
-    except UserError as error:
-        sys.stderr.write(f"sdrlink-ether: {error}\n")
-        sys.exit(2)
+    run_program(app, "sdrlink-ether")
 
 
 if __name__ == "__main__":

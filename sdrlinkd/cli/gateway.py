@@ -3,7 +3,6 @@
 import asyncio
 import logging
 import signal
-import sys
 from collections.abc import Coroutine
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,10 +11,10 @@ import typer
 import uvloop
 
 from sdrlinkd import __version__
+from sdrlinkd.cli.programs import run_program
 from sdrlinkd.config import load_config, make_setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.journal import log_to_stderr
-from sdrlinkd.parent import end_with_parent
 
 DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
 NO_ZENOH = "the gateway needs Zenoh: pip install 'sdrlinkd[zenoh]'"
@@ -39,13 +38,13 @@ def gateway(
         return
     setup = make_setup(load_config(config), config.parent, str(config))
     try:
-        from sdrlinkd.fleet import check_zenoh, run_gateway
+        from sdrlinkd.fleet import make_zenoh_config, run_gateway
     except ModuleNotFoundError as error:
         if error.name != "zenoh":
             raise
         raise UserError(NO_ZENOH) from None
     if check:
-        check_zenoh(setup.config.fleet, config.parent)
+        make_zenoh_config(setup.config.fleet, config.parent)
         typer.echo("the configuration is valid")
         return
     log_to_stderr(logging.INFO)
@@ -67,12 +66,7 @@ async def _until_stopped(work: Coroutine[Any, Any, None]) -> None:
 
 def main() -> None:
     """Run the gateway; the exit code is 2 for errors that a person can fix."""
-    end_with_parent()
-    try:
-        app(prog_name="sdrlink-gateway")
-    except UserError as error:
-        sys.stderr.write(f"sdrlink-gateway: {error}\n")
-        sys.exit(2)
+    run_program(app, "sdrlink-gateway")
 
 
 if __name__ == "__main__":

@@ -127,7 +127,7 @@ def check(
     runtime_dir: RuntimeDir = None,
 ) -> None:
     """Check whether another robot has the running daemon's key; exit code 1 if it has not."""
-    from sdrlinkd.cli.status import ask_status
+    from sdrlinkd.asking import ask_status
     from sdrlinkd.keyring import words_of
 
     with connect(runtime_dir) as control:

@@ -6,11 +6,11 @@ import msgspec
 import typer
 from rich.console import Group
 
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import AsJson, RuntimeDir, Watch, app, connect
 from sdrlinkd.cli.completion import heard_names
 from sdrlinkd.cli.following import watch_screen
 from sdrlinkd.cli.screens import latency_screen
-from sdrlinkd.cli.status import ask_status
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import LinkReport, ReceivedTopicReport
 from sdrlinkd.tables import screen_console

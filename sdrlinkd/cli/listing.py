@@ -13,6 +13,7 @@ from typing import NamedTuple
 import msgspec
 import typer
 
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import AsJson, app, connect
 from sdrlinkd.cli.screens import daemons_table
 from sdrlinkd.client import CONTROL_SOCKET, IN_SOCKET, OUT_SOCKET, NoDaemonError, RefusedError
@@ -103,7 +104,7 @@ def _look(directory: Path) -> Listed:
         problem = "this user has no access"
     try:
         with connect(directory, PATIENCE_S) as control:
-            snapshot = msgspec.convert(control.ask("status"), Snapshot)
+            snapshot = ask_status(control)
     except (NoDaemonError, RefusedError, msgspec.ValidationError):
         pass
     try:

@@ -13,10 +13,10 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from sdrlinkd.adapters import cdr_from_fields, from_cdr, knows
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.completion import heard_names, one_of, robot_names, topic_names
 from sdrlinkd.cli.names import refuse_own, topic_sent
-from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import QOS, Message, Publisher, Subscriber
 from sdrlinkd.errors import CdrError, UserError
 from sdrlinkd.link import CDR_HEADER_SIZE

@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from sdrlinkd.cli.status import ask_status
+from sdrlinkd.asking import ask_status
 from sdrlinkd.client import ControlClient
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import AdmissionReport, ReservedFlowReport

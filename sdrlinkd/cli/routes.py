@@ -7,11 +7,11 @@ import msgspec
 import typer
 from rich.console import Group
 
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import AsJson, RuntimeDir, Watch, app, connect
 from sdrlinkd.cli.following import watch_screen
 from sdrlinkd.cli.output import load_pictures
 from sdrlinkd.cli.screens import routes_screen
-from sdrlinkd.cli.status import ask_status
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import Snapshot
 from sdrlinkd.tables import screen_console

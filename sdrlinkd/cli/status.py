@@ -11,23 +11,19 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import AsJson, RuntimeDir, Watch, app, connect
 from sdrlinkd.cli.completion import field_names
 from sdrlinkd.cli.fields import USUAL, CsvLines, as_text, fields_of
 from sdrlinkd.cli.following import WATCH_PERIOD_S, Follower
 from sdrlinkd.cli.screens import StatusScreen
-from sdrlinkd.client import ControlClient, NoDaemonError
+from sdrlinkd.client import NoDaemonError
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import LinkReport, Snapshot
 from sdrlinkd.tables import SCREEN, screen_console
 
 EXIT_CODES = {"OK": 0, "DEGRADED": 1, "DOWN": 3}
 NO_DAEMON = 4
-
-
-def ask_status(control: ControlClient) -> Snapshot:
-    """The daemon's snapshot, requested over the control socket."""
-    return msgspec.convert(control.ask("status"), Snapshot)
 
 
 @app.command()

@@ -6,9 +6,9 @@ from pathlib import Path
 import msgspec
 import typer
 
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import connect
 from sdrlinkd.cli.screens import team_screen
-from sdrlinkd.cli.status import ask_status
 from sdrlinkd.config import load_config, make_setup
 from sdrlinkd.plan import HOST_S, setting_of, team_worst_s
 from sdrlinkd.reports import AdmissionReport

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.completion import heard_names
 from sdrlinkd.cli.spans import Bandwidth, Delay, Measure, Rate
-from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import Subscriber
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import Snapshot

@@ -3,8 +3,8 @@
 import msgspec
 import typer
 
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
-from sdrlinkd.cli.status import ask_status
 from sdrlinkd.reports import LinkReport
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 

@@ -5,8 +5,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import msgspec
-
+from sdrlinkd.asking import ask_status
 from sdrlinkd.client import ControlClient, Message, NoDaemonError
 from sdrlinkd.demo.hearing import Hearing
 from sdrlinkd.demo.links import NODE_ID
@@ -39,7 +38,7 @@ def daemon(config: Path) -> Iterator[Process]:
 def snapshot_of(directory: Path) -> Snapshot:
     """The snapshot of the daemon whose sockets are in `directory`."""
     with ControlClient(directory) as control:
-        return msgspec.convert(control.ask("status"), Snapshot)
+        return ask_status(control)
 
 
 def problems_of(directory: Path) -> list[str]:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-import msgspec
 from prometheus_client.core import (
     CounterMetricFamily,
     GaugeMetricFamily,
@@ -12,12 +11,11 @@ from prometheus_client.core import (
     StateSetMetricFamily,
 )
 
-from sdrlinkd.client import ControlClient, NoDaemonError, RefusedError
-from sdrlinkd.exporter.families import Family, Labels, Sample, families, info, samples
+from sdrlinkd.asking import snapshot_at
+from sdrlinkd.exporter.families import Family, Labels, Sample, families, info, plain, samples
 from sdrlinkd.exporter.names import PREFIX
 from sdrlinkd.reports import Snapshot
 
-PATIENCE_S = 1.0
 OF_DAEMON = ("node", "namespace")
 
 Ask = Callable[[Path], Snapshot | None]
@@ -28,7 +26,7 @@ class Collector:
 
     def __init__(self, directories: Callable[[], Iterable[Path]], ask: Ask | None = None) -> None:
         self._directories = directories
-        self._ask = ask or snapshot_of
+        self._ask = ask or snapshot_at
         self._grown: dict[Path, _Grown] = {}
 
     def describe(self) -> list[Metric]:
@@ -49,12 +47,14 @@ class Collector:
             if snapshot is None:
                 continue
             daemon = (str(snapshot.node), snapshot.namespace)
-            about.add_metric(daemon, info(snapshot))
+            figures = plain(snapshot)
+            about.add_metric(daemon, info(figures))
             grown = self._grown[path].since(snapshot.uptime_s)
-            for family, values in samples(snapshot):
-                metric = made.setdefault(family.name, _metric(family))
+            for family, values in samples(figures):
+                if family.name not in made:
+                    made[family.name] = _metric(family)
                 for sample in values:
-                    _add(metric, family, daemon, sample, grown)
+                    _add(made[family.name], family, daemon, sample, grown)
         yield up
         if made:
             yield about
@@ -85,15 +85,6 @@ class _Grown:
         value = max(sample.value, self._values.get(key, 0.0))
         self._values[key] = value
         return value
-
-
-def snapshot_of(directory: Path) -> Snapshot | None:
-    """The daemon's snapshot; None if it does not answer, or is of another version."""
-    try:
-        with ControlClient(directory, PATIENCE_S) as control:
-            return msgspec.convert(control.ask("status"), Snapshot)
-    except (NoDaemonError, RefusedError, msgspec.ValidationError):
-        return None
 
 
 def _metric(family: Family) -> Metric:

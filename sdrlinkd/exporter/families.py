@@ -78,21 +78,25 @@ def families() -> tuple[Family, ...]:
     return tuple(_of_field(inspect.type_info(Snapshot), (), (), ""))
 
 
-def samples(snapshot: Snapshot) -> Iterator[tuple[Family, list[Sample]]]:
-    """The samples of each family that has some."""
-    whole = msgspec.to_builtins(snapshot, str_keys=True)
+def plain(snapshot: Snapshot) -> dict[str, Any]:
+    """A snapshot as maps and lists, as `samples` and `info` need it."""
+    found: dict[str, Any] = msgspec.to_builtins(snapshot, str_keys=True)
+    return found
+
+
+def samples(figures: Mapping[str, Any]) -> Iterator[tuple[Family, list[Sample]]]:
+    """The samples of each family that has some, from a snapshot made `plain`."""
     for family in families():
-        found = list(_walk(whole, family, family.path, (), ()))
+        found = list(_walk(figures, family, family.path, (), ()))
         if found:
             yield family, found
 
 
-def info(snapshot: Snapshot) -> dict[str, str]:
-    """The labels of sdrlink_info."""
-    whole = msgspec.to_builtins(snapshot, str_keys=True)
+def info(figures: Mapping[str, Any]) -> dict[str, str]:
+    """The labels of sdrlink_info, from a snapshot made `plain`."""
     found = {}
     for path, label in INFO.items():
-        value: Any = whole
+        value: Any = figures
         for step in path.split("."):
             value = value[step]
         found[label] = str(value)

@@ -17,14 +17,14 @@ from sdrlinkd.fleet.formats import (
     read_fate,
     read_passed,
 )
-from sdrlinkd.fleet.forwarding import Forwarding
-from sdrlinkd.fleet.gateway import Gateway, run_gateway
+from sdrlinkd.fleet.forwarding import Forwarding, Turn
+from sdrlinkd.fleet.gateway import run_gateway
 from sdrlinkd.fleet.keys import Keys, TopicKey
 from sdrlinkd.fleet.names import Duplicates
 from sdrlinkd.fleet.report import GatewayReport
-from sdrlinkd.fleet.session import Session, open_session
+from sdrlinkd.fleet.session import open_session
 from sdrlinkd.fleet.subscriber import FleetClient, FleetMessage
-from sdrlinkd.fleet.zenoh_config import check_zenoh
+from sdrlinkd.fleet.zenoh_config import make_zenoh_config
 
 __all__ = [
     "Claim",
@@ -36,17 +36,16 @@ __all__ = [
     "FleetClient",
     "FleetMessage",
     "Forwarding",
-    "Gateway",
     "GatewayReport",
     "Keys",
     "Order",
     "Passed",
     "Refusal",
-    "Session",
     "TopicKey",
-    "check_zenoh",
+    "Turn",
     "encode",
     "is_passed",
+    "make_zenoh_config",
     "open_session",
     "read_claim",
     "read_command",

@@ -4,15 +4,13 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-import msgspec
-
+from sdrlinkd.asking import snapshot_at
 from sdrlinkd.client import (
     AsyncSubscriber,
     ControlClient,
     EnvelopeMismatchError,
     Message,
     NoDaemonError,
-    RefusedError,
 )
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import Snapshot
@@ -58,18 +56,15 @@ class DaemonSide:
         With None while it is away, or of another version.
         """
         while True:
-            try:
-                answer = await asyncio.to_thread(self._ask, "status", None)
-                self.snapshot = msgspec.convert(answer, Snapshot)
-            except (NoDaemonError, RefusedError, msgspec.ValidationError):
-                self.snapshot = None
+            self.snapshot = await asyncio.to_thread(snapshot_at, self._directory, ANSWER_S)
             see(self.snapshot)
             await asyncio.sleep(POLL_S)
 
     async def declare(self, name: str, kind: str) -> None:
         """Declare a topic of type `kind` on the bus. Raises RefusedError and NoDaemonError."""
-        await asyncio.to_thread(self._ask, "declare", {"name": name, "type": kind})
 
-    def _ask(self, verb: str, arguments: dict[str, str] | None) -> object:
-        with ControlClient(self._directory, timeout_s=ANSWER_S) as control:
-            return control.ask(verb, {**arguments} if arguments else None)
+        def ask() -> None:
+            with ControlClient(self._directory, timeout_s=ANSWER_S) as control:
+                control.ask("declare", {"name": name, "type": kind})
+
+        await asyncio.to_thread(ask)

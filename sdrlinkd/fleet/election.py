@@ -35,6 +35,11 @@ class Election:
         """The highest term so far."""
 
     @property
+    def score(self) -> float | None:
+        """How well this gateway hears the robot; None: not at all."""
+        return self._score
+
+    @property
     def leads(self) -> bool:
         """Whether this gateway leads."""
         return self._leader is not None and self._leader.gw == self._own_id

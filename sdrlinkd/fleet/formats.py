@@ -17,6 +17,8 @@ MOST_OCTETS = 1024
 Gateway = Annotated[int, Meta(ge=0, le=254)]
 Number = Annotated[int, Meta(ge=0, le=1 << 53)]
 Text = Annotated[str, Meta(max_length=128)]
+Qos = Literal["", "urgent", "latency", "default", "bulk"]
+"""A class; empty: that of the topic."""
 
 
 class Passed(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -53,7 +55,7 @@ class Command(msgspec.Struct, frozen=True, omit_defaults=True):
     op: Annotated[str, Meta(max_length=32)] = ""
     n: Number | None = None
     ty: Text = ""
-    q: Literal["", "urgent", "latency", "default", "bulk"] = ""
+    q: Qos = ""
     ls: Annotated[float, Meta(gt=0)] | None = None
 
 

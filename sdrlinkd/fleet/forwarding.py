@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Hashable
 from dataclasses import dataclass
+from enum import Enum
 from typing import Generic, TypeVar
 
 from sdrlinkd.client import MessageName
@@ -18,6 +19,15 @@ REMEMBERED = 64
 """The leader's last puts of which the delay is remembered."""
 
 T = TypeVar("T")
+
+
+class Turn(Enum):
+    """Whose turn it is to put a message that has come from the radio."""
+
+    OURS = "this gateway puts it now"
+    LATER = "it is held, and put if nobody else does"
+    OTHERS = "another gateway puts it, or has put it"
+    PAST = "it came before"
 
 
 @dataclass(slots=True)
@@ -37,7 +47,7 @@ class _Known(Generic[T]):
 class Forwarding(Generic[T]):
     """A gateway's messages of one robot; items of any type, times in s.
 
-    What is to be put is returned. The gateway that leads puts at once; the others hold their copy.
+    The gateway that leads puts at once; the others hold their copy.
     """
 
     def __init__(self) -> None:
@@ -47,8 +57,6 @@ class Forwarding(Generic[T]):
         self.hold_s = FIRST_HOLD_S
         self.rank = 0
         """Gateways besides the leader that put before this one what the leader missed."""
-        self.left_to_others = 0
-        """Messages that another gateway put."""
         self.put_for_others = 0
         """Messages that the leader did not put in time, and this gateway did."""
         self.put_twice = 0
@@ -56,61 +64,58 @@ class Forwarding(Generic[T]):
 
     def heard(
         self, key: Hashable, name: MessageName | None, item: T, now: float, *, leads: bool
-    ) -> T | None:
-        """Take a message from the radio; returns it if it is to be put now."""
+    ) -> Turn:
+        """Take a message from the radio."""
         if name is None:
             # Each daemon makes a stop message of its own.
-            self.left_to_others += not leads
-            return item if leads else None
+            return Turn.OURS if leads else Turn.OTHERS
         at: Key = (key,)
         known = self._known.find(at, name, now)
         if known is None:
             known = _Known[T](heard_at=now)
             self._known.add(at, name, known, now)
         elif known.heard_at is not None:
-            return None
+            return Turn.PAST
         else:
             known.heard_at = now
             if known.passed_at is not None:
                 if known.is_led:
                     self._learn(now, known.passed_at)
-                self.left_to_others += 1
-                return None
+                return Turn.OTHERS
         if leads:
             known.is_put = True
-            return item
+            return Turn.OURS
         known.item = item
         self._held.append((now + self.hold_s * (1 + self.rank), known))
-        return None
+        return Turn.LATER
 
     def passed(
         self, key: Hashable, name: MessageName | None, now: float, *, by_leader: bool
-    ) -> None:
-        """Note that another gateway has put a message.
+    ) -> bool:
+        """Note that another gateway has put a message; True if the copy held here is dropped.
 
         Delays are learnt from the leader alone: the others have waited for it.
         """
         if name is None:
-            return
+            return False
         at: Key = (key,)
         known = self._known.find(at, name, now)
         if known is None:
             self._known.add(at, name, _Known(passed_at=now, is_led=by_leader), now)
-            return
+            return False
         if known.passed_at is not None:
-            return
+            return False
         known.passed_at = now
         if known.heard_at is None:
-            return
+            return False
         if by_leader:
             self._learn(known.heard_at, now)
         if known.is_put:
             self.put_twice += 1
             if by_leader:
                 self.hold_s = min(MOST_HOLD_S, 2 * self.hold_s)
-        elif known.item is not None:
-            known.item = None
-            self.left_to_others += 1
+        was_held, known.item = known.item is not None, None
+        return was_held
 
     @property
     def due_at(self) -> float:

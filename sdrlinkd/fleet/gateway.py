@@ -11,6 +11,7 @@ import msgspec
 from sdrlinkd.client import Message
 from sdrlinkd.config import Setup
 from sdrlinkd.errors import UserError
+from sdrlinkd.fleet.alarm import Alarm
 from sdrlinkd.fleet.commands import Order
 from sdrlinkd.fleet.daemon_side import DaemonSide
 from sdrlinkd.fleet.downward import DownwardCommands
@@ -63,7 +64,7 @@ class Gateway:
             self._bus_name,
             self._daemon.declare,
         )
-        self._alarm: asyncio.TimerHandle | None = None
+        self._alarm = Alarm(self._do_due)
         self._sending: set[asyncio.Task[None]] = set()
 
     async def run(self) -> None:
@@ -97,7 +98,7 @@ class Gateway:
                 RobotHeard(
                     robot=robot.id,
                     leader=robot.election.leader,
-                    score=robot.score,
+                    score=robot.election.score,
                     hold_ms=1e3 * robot.forwarding.hold_s,
                     put_for_others=robot.forwarding.put_for_others,
                     put_twice=robot.forwarding.put_twice,
@@ -120,15 +121,17 @@ class Gateway:
             return
         now, topic = _now(), message.topic.removeprefix(prefix)
         qos = self._classes.get(topic, "default")
-        self._up.take(self._robot(message.source), topic, qos, message, now)
+        robot = self._robot(message.source)
+        robot.heard_at = now
+        self._up.take(robot, topic, qos, message, now)
         self._set_alarm()
 
     def _robot(self, robot: int) -> HeardRobot:
         known = self._robots.get(robot)
         if known is None:
             now = _now()
-            known = HeardRobot(robot, Election(self._own_id, self._lease_s, now), Forwarding())
-            known.heard_at = now
+            election = Election(self._own_id, self._lease_s, now)
+            known = HeardRobot(robot, election, Forwarding(), now)
             self._robots[robot] = known
             key = self._keys.messages(robot)
             known.ends = [
@@ -146,7 +149,7 @@ class Gateway:
         now = _now()
         self._up.passed(known, sample, now)
         if self._setup.config.fleet.down:
-            order = self._down.take(sample, known.score, now, leads=known.election.leads)
+            order = self._down.take(sample, known.election.score, now, leads=known.election.leads)
             if order is not None:
                 self._spawn(order)
         self._set_alarm()
@@ -211,8 +214,7 @@ class Gateway:
         for robot in scores:
             self._robot(robot).heard_at = now
         for known in list(self._robots.values()):
-            known.score = scores.get(known.id)
-            known.election.hear(known.score, now)
+            known.election.hear(scores.get(known.id), now)
             if now > known.heard_at + FORGOTTEN_S:
                 del self._robots[known.id]
                 for end in known.ends:
@@ -239,14 +241,9 @@ class Gateway:
 
     def _set_alarm(self) -> None:
         """Wake up when something that is held is due."""
-        if self._alarm is not None:
-            self._alarm.cancel()
-        due_at = min((each.forwarding.due_at for each in self._robots.values()), default=_NEVER)
-        due_at = min(due_at, self._down.due_at)
-        self._alarm = None
-        if due_at < _NEVER:
-            loop = asyncio.get_running_loop()
-            self._alarm = loop.call_later(max(0.0, due_at - _now()), self._do_due)
+        held = (each.forwarding.due_at for each in self._robots.values())
+        self._alarm.ring_by(min(held, default=self._down.due_at))
+        self._alarm.ring_by(self._down.due_at)
 
     def _do_due(self) -> None:
         now = _now()
@@ -275,9 +272,6 @@ class Gateway:
 
     def _told(self) -> bytes:
         return msgspec.json.encode(self.report())
-
-
-_NEVER = float("inf")
 
 
 def _now() -> float:

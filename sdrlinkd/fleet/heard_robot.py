@@ -26,7 +26,6 @@ class HeardRobot:
     id: int
     election: Election
     forwarding: Forwarding[Upward]
+    heard_at: float
     ends: list[Callable[[], None]] = field(default_factory=list)
     """Take down what was declared on Zenoh for this robot."""
-    score: float | None = None
-    heard_at: float = 0.0

@@ -21,9 +21,6 @@ class NamedRecently(Generic[T]):
         self._named: dict[Key, list[tuple[MessageName, T]]] = {}
         self._order: deque[tuple[float, Key]] = deque()
 
-    def __len__(self) -> int:
-        return len(self._order)
-
     def find(self, key: Key, name: MessageName, now: float) -> T | None:
         """The value of the message; None if it is not known."""
         self._forget(now)

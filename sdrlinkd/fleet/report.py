@@ -5,11 +5,12 @@ from collections import Counter
 import msgspec
 
 UP = (
-    "up_put", "up_left", "up_held", "up_not_selected", "up_away", "up_overflow",
+    "up_put", "up_left", "up_held", "up_repeated", "up_not_selected", "up_away", "up_overflow",
 )  # fmt: skip
 """Ends of messages from robots: put on Zenoh; left to another gateway, which put them; held, as it
-is not known yet whether another one puts them; of topics that `fleet.up` does not name; not put as
-no other Zenoh node was reached; not put as too many puts waited.
+is not known yet whether another one puts them; handed over by the daemon once more; of topics that
+`fleet.up` does not name; not put as no other Zenoh node was reached; not put as too many puts
+waited.
 """
 DOWN = (
     "down_sent", "down_left", "down_outdated", "down_again", "down_not_allowed",
@@ -80,10 +81,10 @@ class Counts:
         """Count `n` more under a name of UP or DOWN, or under up_taken, up_again or down_taken."""
         self._counts[name] += n
 
-    def move(self, name: str, to: str, n: int = 1) -> None:
-        """Count `n` under another name."""
-        self._counts[name] -= n
-        self._counts[to] += n
+    def move(self, name: str, to: str) -> None:
+        """Count one under another name."""
+        self._counts[name] -= 1
+        self._counts[to] += 1
 
     def of(self, names: tuple[str, ...]) -> dict[str, int]:
         """The counters of these names."""

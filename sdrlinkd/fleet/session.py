@@ -18,7 +18,7 @@ import zenoh
 from sdrlinkd.config import FleetParams
 from sdrlinkd.errors import UserError
 from sdrlinkd.fleet.putting import Lane
-from sdrlinkd.fleet.zenoh_config import cause, zenoh_config
+from sdrlinkd.fleet.zenoh_config import cause, make_zenoh_config
 
 MOST_WAITING = 8192
 MOST_QUERIES = 64
@@ -61,8 +61,10 @@ class Session:
         self._session = session
         self._loop = loop
         self._waiting: deque[Callable[[], None]] = deque()
+        self._is_draining = False
         self._lock = threading.Lock()
-        self._queries = 0
+        """Of what Zenoh's threads change: what waits, and the counters below."""
+        self._may_query = threading.BoundedSemaphore(MOST_QUERIES)
         self._lanes = {name: Lane(f"zenoh-{name}") for name in ("block", "drop")}
         self._answers = Lane("zenoh-answers", MOST_QUERIES)
         self._transports = 0
@@ -129,13 +131,14 @@ class Session:
         """Answer queries that intersect `key`: `answers` gets the key that was asked for."""
 
         def asked(query: zenoh.Query) -> None:
-            if self._queries >= MOST_QUERIES:
-                self.queries_refused += 1
-                query.reply_err(b"too many queries; ask again later")
-                query.drop()  # type: ignore[no-untyped-call]
+            if self._may_query.acquire(blocking=False):
+                with contextlib.suppress(RuntimeError):  # the loop has ended
+                    self._loop.call_soon_threadsafe(self._answer, query, answers)
                 return
-            self._queries += 1
-            self._loop.call_soon_threadsafe(self._answer, query, answers)
+            with self._lock:
+                self.queries_refused += 1
+            query.reply_err(b"too many queries; ask again later")
+            query.drop()  # type: ignore[no-untyped-call]
 
         return self._keep(self._session.declare_queryable(key, asked))
 
@@ -161,7 +164,7 @@ class Session:
         try:
             found = list(answers(str(query.key_expr)))
         except BaseException:
-            self._queries -= 1
+            self._may_query.release()
             raise
 
         def reply() -> None:
@@ -170,11 +173,9 @@ class Session:
                     query.reply(key, payload, attachment=attachment)
             finally:
                 query.drop()  # type: ignore[no-untyped-call]
-                self._queries -= 1
+                self._may_query.release()
 
-        if not self._answers.offer(reply):
-            self._queries -= 1
-            self.queries_refused += 1
+        self._answers.offer(reply)  # It has room for MOST_QUERIES.
 
     def _post(self, action: Callable[[], None]) -> None:
         """Have `action` run on the loop; called by Zenoh's threads."""
@@ -183,24 +184,20 @@ class Session:
                 self.overrun += 1
                 return
             self._waiting.append(action)
-            is_first = len(self._waiting) == 1
-        if is_first:
+            is_draining, self._is_draining = self._is_draining, True
+        if not is_draining:
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 self._loop.call_soon_threadsafe(self._drain)
 
     def _drain(self) -> None:
         with self._lock:
             n = min(len(self._waiting), AT_ONCE)
-            actions = [self._waiting.popleft() for _ in range(n - 1)]
-            # The last one stays until it has run, so that `_post` does not call this again.
-            actions.append(self._waiting[0])
+            actions = [self._waiting.popleft() for _ in range(n)]
+            self._is_draining = n > 0
         for action in actions:
             # By the loop, so that one that fails is logged and does not stop the others.
             self._loop.call_soon(action)
-        with self._lock:
-            self._waiting.popleft()
-            is_more = bool(self._waiting)
-        if is_more:
+        if actions:
             self._loop.call_soon(self._drain)
 
     def _note_transport(self, event: zenoh.TransportEvent) -> None:
@@ -220,7 +217,7 @@ async def open_session(params: FleetParams, folder: Path) -> Session:
 
     File names are relative to `folder`. Raises UserError.
     """
-    config = zenoh_config(params, folder)
+    config = make_zenoh_config(params, folder)
     is_told = False
     while True:
         try:

@@ -1,21 +1,21 @@
 """For operators' programs: messages of a fleet's robots, each once, and commands to them."""
 
 import asyncio
+import itertools
 import secrets
 import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, NamedTuple, Self
+from typing import NamedTuple, Self
 
 from sdrlinkd.config import FleetParams
-from sdrlinkd.fleet.formats import Command, Fate, Passed, encode, read_fate, read_passed
+from sdrlinkd.fleet.formats import Command, Fate, Passed, Qos, encode, read_fate, read_passed
 from sdrlinkd.fleet.keys import Keys
 from sdrlinkd.fleet.names import Duplicates
 from sdrlinkd.fleet.session import Sample, Session, open_session
 
 MOST_WAITING = 4096
-Qos = Literal["", "urgent", "latency", "default", "bulk"]
 
 
 class FleetMessage(NamedTuple):
@@ -39,7 +39,7 @@ class FleetClient:
         self._messages: asyncio.Queue[FleetMessage] = asyncio.Queue(MOST_WAITING)
         self._duplicates = Duplicates()
         self._operator = secrets.token_hex(4)
-        self._numbers = iter(range(1 << 53))
+        self._numbers = itertools.count()
         self.on_fate: Callable[[int, Fate], None] = lambda _robot, _fate: None
         """Called with what becomes of this program's commands."""
         self.overrun = 0
@@ -64,11 +64,6 @@ class FleetClient:
     def duplicates(self) -> int:
         """Messages that came from a second gateway, too, and were dropped here."""
         return self._duplicates.dropped
-
-    @property
-    def is_reached(self) -> bool:
-        """Whether a Zenoh node is connected."""
-        return self._session is not None and self._session.is_reached
 
     async def receive(self) -> FleetMessage:
         """Wait for the next message and return it."""

@@ -8,6 +8,7 @@ import msgspec
 
 from sdrlinkd.client import Message
 from sdrlinkd.fleet.formats import Passed, encode, read_passed
+from sdrlinkd.fleet.forwarding import Turn
 from sdrlinkd.fleet.heard_robot import HeardRobot, Upward
 from sdrlinkd.fleet.keys import Keys
 from sdrlinkd.fleet.last_values import LastValues
@@ -16,6 +17,8 @@ from sdrlinkd.fleet.session import Answer, Sample, Session
 
 SETTLED_S = 0.7
 """Time in s after which whoever reaches the network again has found its way in it."""
+
+_NOT_PUT = {Turn.LATER: "up_held", Turn.OTHERS: "up_left", Turn.PAST: "up_repeated"}
 
 
 class UpwardMessages:
@@ -44,7 +47,6 @@ class UpwardMessages:
         item = Upward(key, message.payload, _passed(self._own_id, message), qos, now)
         if not message.is_stop:
             self._last.keep(key, item.payload, item.passed, now)
-        robot.heard_at = now
         if now < self._settled_at:
             self._missed.add(key)
         if not self._session.is_reached:
@@ -52,15 +54,13 @@ class UpwardMessages:
             self._missed.add(key)
             self._counts.add("up_away")
             return
-        forwarding, leads = robot.forwarding, robot.election.leads
-        before = forwarding.left_to_others
-        put = forwarding.heard((key, message.series), message.name, item, now, leads=leads)
-        if put is not None:
-            self._put(put, now)
-        elif forwarding.left_to_others > before:
-            self._counts.add("up_left")
+        turn = robot.forwarding.heard(
+            (key, message.series), message.name, item, now, leads=robot.election.leads
+        )
+        if turn is Turn.OURS:
+            self._put(item, now)
         else:
-            self._counts.add("up_held")
+            self._counts.add(_NOT_PUT[turn])
 
     def passed(self, robot: HeardRobot, sample: Sample, now: float) -> None:
         """Note that another gateway has put a message of a robot."""
@@ -70,10 +70,10 @@ class UpwardMessages:
         kept = self._last.get(sample.key) if sample.key in self._missed else None
         if kept is not None and passed.name is not None and kept[1].name == passed.name:
             self._missed.discard(sample.key)
-        before = robot.forwarding.left_to_others
         is_led = passed.gw == robot.election.leader
-        robot.forwarding.passed((sample.key, passed.sr), passed.name, now, by_leader=is_led)
-        self._counts.move("up_held", "up_left", robot.forwarding.left_to_others - before)
+        key = sample.key, passed.sr
+        if robot.forwarding.passed(key, passed.name, now, by_leader=is_led):
+            self._counts.move("up_held", "up_left")
 
     def put_due(self, robot: HeardRobot, now: float, *, all_held: bool = False) -> None:
         """Put what was held for long enough, or, as this gateway leads from now on, all of it."""

@@ -13,15 +13,11 @@ RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 
 SAFE_PROTOCOLS = ("tls", "quic")
 
 
-def check_zenoh(params: FleetParams, folder: Path) -> None:
-    """Check `[fleet]` and the file that it names. Raises ConfigError."""
-    zenoh_config(params, folder)
+def make_zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
+    """Zenoh's configuration; raises ConfigError.
 
-
-def zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
-    """Zenoh's configuration; a file given in `zenoh` comes first, `[fleet]` then. Raises UserError.
-
-    A fleet that sends to robots needs TLS at all endpoints, or access control.
+    Where the file given in `zenoh` says whom to connect to, that counts unless `[fleet]` says it. A
+    fleet that sends to robots needs TLS at all endpoints, or access control.
     """
     config = zenoh.Config()
     if params.zenoh:
@@ -31,7 +27,7 @@ def zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
         except zenoh.ZError as error:
             raise ConfigError(f"fleet.zenoh: {path}: {cause(error)}") from None
     connect = params.connect or ([] if params.listen else [LOCAL_ROUTER])
-    if not params.zenoh or params.connect or params.listen:
+    if params.connect or params.listen or not _says_where(config):
         settings: dict[str, object] = {
             "mode": "router" if params.listen else "client",
             "connect/endpoints": connect,
@@ -46,6 +42,12 @@ def zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
     if params.down:
         _check_guard(config)
     return config
+
+
+def _says_where(config: zenoh.Config) -> bool:
+    """Whether a file has changed how nodes find each other."""
+    keys, plain = ("mode", "connect/endpoints", "listen/endpoints"), zenoh.Config()
+    return any(config.get_json(key) != plain.get_json(key) for key in keys)
 
 
 def _check_guard(config: zenoh.Config) -> None:

@@ -1,44 +1,31 @@
 """A robot, two gateways that hear it, and a Zenoh router, all of them real."""
 
 import contextlib
-import json
-import socket
 
 import msgspec
 import pytest
 import zenoh
 
+from benchmarks.fleet.field import GUARD, free_endpoint
 from benchmarks.fleet.pdu_air import PduAir
+from benchmarks.peers.zenoh_router import router_config
 from sdrlinkd.config import FleetParams
 from sdrlinkd.fleet import GatewayReport
 from sdrlinkd.process import Process, module
 from tests.waiting import wait_for
 
 ROBOT, FIRST, SECOND = 2, 7, 8
-OPEN_TO_ALL = (
-    '{access_control: {enabled: true, default_permission: "allow", rules: [], subjects: [], '
-    "policies: []}}"
-)
 
 
 class Router:
     """A Zenoh router that can be stopped and started again at the same port."""
 
     def __init__(self):
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+        self.endpoint = free_endpoint()
         self.session = None
 
     def start(self):
-        config = zenoh.Config()
-        for key, value in {
-            "mode": "router",
-            "listen/endpoints": [self.endpoint],
-            "scouting/multicast/enabled": False,
-        }.items():
-            config.insert_json5(key, json.dumps(value))
-        self.session = zenoh.open(config)
+        self.session = zenoh.open(router_config(self.endpoint))
 
     def stop(self):
         if self.session is not None:
@@ -62,7 +49,7 @@ class Fleet:
 
     def start(self, start_daemon, more):
         self.router.start()
-        (self.folder / "zenoh.json5").write_text(OPEN_TO_ALL)
+        (self.folder / "zenoh.json5").write_text(GUARD)
         for robot in (ROBOT, FIRST, SECOND):
             self.daemons[robot] = start_daemon(
                 f'namespace = "robot_{robot}"\nbackend = "gnuradio"\n{self.air.settings(robot)}'

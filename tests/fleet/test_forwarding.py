@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.client import MessageName
-from sdrlinkd.fleet import Duplicates, Forwarding
+from sdrlinkd.fleet import Duplicates, Forwarding, Turn
 from tests.laws import law
 
 STEP_S = 0.0005
@@ -26,6 +26,8 @@ class Gateways:
             forwarding.rank = max(0, gateway - 1) if leader == 0 else gateway
         self.puts = []
         """(time, gateway, message)."""
+        self.n_left = 0
+        """Copies dropped because another gateway had put the message."""
         self._in_flight = []
 
     def run(self, until):
@@ -35,7 +37,9 @@ class Gateways:
             self._in_flight = [each for each in self._in_flight if each[0] > self.now]
             for _, gateway, src, number in arrived:
                 is_led = src == self.leader
-                self.each[gateway].passed("odom", name_of(number), self.now, by_leader=is_led)
+                self.n_left += self.each[gateway].passed(
+                    "odom", name_of(number), self.now, by_leader=is_led
+                )
             for gateway, forwarding in enumerate(self.each):
                 for number in forwarding.due(self.now):
                     self.put(gateway, number)
@@ -51,9 +55,9 @@ class Gateways:
         for gateway in heard:
             forwarding = self.each[gateway]
             leads = gateway == self.leader
-            item = forwarding.heard("odom", name_of(number), number, self.now, leads=leads)
-            if item is not None:
-                self.put(gateway, item)
+            turn = forwarding.heard("odom", name_of(number), number, self.now, leads=leads)
+            if turn is Turn.OURS:
+                self.put(gateway, number)
         return heard
 
 
@@ -79,7 +83,7 @@ def test_two_that_hear_most_put_all_of_it_once():
     assert len(heard) / 600 == pytest.approx(1 - 0.06 * 0.22, abs=0.01)
     second = gateways.each[1]
     assert second.put_for_others == sum(gateway == 1 for _, gateway, _ in gateways.puts)
-    assert second.left_to_others > 400
+    assert gateways.n_left > 400
 
 
 def test_what_the_leader_missed_is_little_later():
@@ -123,15 +127,23 @@ def test_without_a_leader_nothing_is_lost():
 
 def test_who_leads_from_now_on_puts_what_it_held():
     forwarding = Forwarding()
-    assert forwarding.heard("odom", name_of(0), "a", 0.0, leads=False) is None
+    assert forwarding.heard("odom", name_of(0), "a", 0.0, leads=False) is Turn.LATER
     assert forwarding.lead() == ["a"]
     assert forwarding.due(1.0) == []
 
 
+@pytest.mark.parametrize("leads", [True, False])
+def test_what_comes_once_more_is_not_put_again(leads):
+    forwarding = Forwarding()
+    forwarding.heard("odom", name_of(0), "a", 0.0, leads=leads)
+    assert forwarding.heard("odom", name_of(0), "a", 0.1, leads=leads) is Turn.PAST
+    assert forwarding.lead() == ([] if leads else ["a"])
+
+
 def test_stop_messages_have_no_name_and_only_the_leader_puts_them():
     forwarding = Forwarding()
-    assert forwarding.heard("cmd_vel", None, "stop", 0.0, leads=False) is None
-    assert forwarding.heard("cmd_vel", None, "stop", 0.0, leads=True) == "stop"
+    assert forwarding.heard("cmd_vel", None, "stop", 0.0, leads=False) is Turn.OTHERS
+    assert forwarding.heard("cmd_vel", None, "stop", 0.0, leads=True) is Turn.OURS
     assert forwarding.due(9.0) == []
 
 

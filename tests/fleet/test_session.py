@@ -1,13 +1,14 @@
 """The Zenoh session on an event loop: callbacks in order, faults that stay where they are."""
 
 import asyncio
+import json
 import logging
 
 import pytest
 
 from sdrlinkd.config import FleetParams
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.fleet import check_zenoh, open_session
+from sdrlinkd.fleet import make_zenoh_config, open_session
 from tests.fleet.conftest import Router
 from tests.waiting import wait_for
 
@@ -73,10 +74,25 @@ async def test_it_opens_as_soon_as_a_router_is_there(router, tmp_path, caplog):
 )
 def test_what_is_not_safe_or_not_there_is_refused(params, said, tmp_path):
     with pytest.raises(ConfigError, match=said):
-        check_zenoh(FleetParams(**params), tmp_path)
+        make_zenoh_config(FleetParams(**params), tmp_path)
 
 
 def test_tls_or_access_control_will_do(tmp_path):
-    check_zenoh(FleetParams(down=["cmd_vel"], connect=["tls/a:1", "quic/b:2"]), tmp_path)
+    make_zenoh_config(FleetParams(down=["cmd_vel"], connect=["tls/a:1", "quic/b:2"]), tmp_path)
     (tmp_path / "acl.json5").write_text("{access_control: {enabled: true}}")
-    check_zenoh(FleetParams(down=["cmd_vel"], zenoh="acl.json5"), tmp_path)
+    make_zenoh_config(FleetParams(down=["cmd_vel"], zenoh="acl.json5"), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("file", "mode", "connect"),
+    [
+        ("{access_control: {enabled: true}}", "client", ["tcp/localhost:7447"]),
+        ('{mode: "router"}', "router", []),
+        ('{mode: "client", connect: {endpoints: ["tcp/a:1"]}}', "client", ["tcp/a:1"]),
+    ],
+)
+def test_a_file_of_zenoh_counts_where_it_says_whom_to_connect_to(file, mode, connect, tmp_path):
+    (tmp_path / "zenoh.json5").write_text(file)
+    config = make_zenoh_config(FleetParams(zenoh="zenoh.json5"), tmp_path)
+    assert json.loads(config.get_json("mode")) == mode
+    assert json.loads(config.get_json("connect/endpoints")) == connect
