@@ -19,9 +19,9 @@ NEAR = 1.1
 """How much longer than the best path one may be that takes fewer relays."""
 
 
-def cost_of(share: float, share_back: float) -> float:
-    """What a link costs over which these shares of PDUs arrive, one way and back."""
-    return float(min((share * share_back) ** -LOSSY, MOST_COST))
+def cost_of(share: float) -> float:
+    """What a link costs over which this share of PDUs, and of the answers to them, arrives."""
+    return float(min(share**-LOSSY, MOST_COST))
 
 
 def pdus_sent(cost: float) -> float:

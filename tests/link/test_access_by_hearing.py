@@ -191,18 +191,6 @@ def test_a_poor_link_counts_as_none_after_some_time():
     assert "do not hear" not in access.state
 
 
-def test_a_link_is_not_poor_by_the_last_digit_of_its_cost():
-    """Half of the PDUs arrive there and back, whichever way loses more of them."""
-    costs = [(2 ** (-loss / 16) * 2 ** (-(16 - loss) / 16)) ** -2 for loss in range(17)]
-    assert len(set(costs)) > 1
-    for cost in costs:
-        access, now = access_with()
-        access.know_links({**TOGETHER, 2: {1: 1.0, 3: cost}, 3: {1: 1.0, 2: cost}})
-        for after_s in range(1, 10):
-            beacons(access, now + after_s)
-            assert "do not hear" not in access.state, cost
-
-
 def test_a_robot_that_has_gone_is_not_one_that_others_do_not_hear():
     access, now = access_with()
     access.know_links({**TOGETHER, 3: {2: 1.0}, 1: {2: 1.0}})

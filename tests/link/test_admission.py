@@ -104,7 +104,7 @@ def test_the_planner_is_the_lowest_that_all_hear():
 
 
 def test_air_is_counted_over_the_whole_route():
-    lossy = cost_of(1 / 1.5, 1 / 1.5)
+    lossy = cost_of(1 / 1.5**2)
     chain = {1: {2: 1.0}, 2: {1: 1.0, 3: lossy}, 3: {2: lossy}}
     assert way_of(chain, 1, 3).n_sent == pytest.approx(2.5)
     assert way_of(chain, 1, 2).n_sent == 1.0
@@ -173,7 +173,7 @@ def test_noise_of_the_links_does_not_take_air_from_a_flow():
     def word(cost):
         air.look(
             air_at.pop(0), [flow(air=13_000)._replace(dst=1)],
-            {1: {2: 1.0}, 2: {1: cost_of(1 / cost, 1 / cost)}}, 1.0,
+            {1: {2: 1.0}, 2: {1: cost_of(1 / cost**2)}}, 1.0,
         )  # fmt: skip
         (each,) = air.flows()
         return each.air

@@ -135,9 +135,20 @@ def test_links_follow_from_the_newest_lsas_alone(told):
         for one, other in permutations(newest, 2):
             way, back = newest[one].get(other, MAX_LOSS), newest[other].get(one, MAX_LOSS)
             if max(way, back) < MAX_LOSS:
-                wanted[one][other] = cost_of(share_of(way), share_of(back))
+                wanted[one][other] = cost_of(share_of(way + back))
         given_out.append((routes.take_links(), wanted))
     assert all(links == wanted for links, wanted in given_out)
+
+
+def test_a_link_costs_the_same_whichever_way_loses_more():
+    """Half of the PDUs and their answers arrive: by a rounding more would count as poor."""
+    costs = []
+    for loss in range(17):
+        routes = Routes(AUTO, 1, 6, 200, lambda: 0)
+        routes.hear(2, Lsa(2, 0, ((3, loss),)), 0.0)
+        routes.hear(3, Lsa(3, 0, ((2, 16 - loss),)), 0.0)
+        costs.append(routes.take_links()[2][3])
+    assert costs == [4.0] * 17
 
 
 def test_an_lsa_that_somebody_has_missed_is_told_again_as_long_as_it_is_new():

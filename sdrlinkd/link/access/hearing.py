@@ -14,9 +14,6 @@ DEAF_S, POOR_S = 2.5, 5.0
 they hear each other poorly, before they count as apart. In the first one, a pause that is not
 noticed (below) has room, and after it a lost LSA that comes again. After a pause, what came
 meanwhile counts as lost for some time."""
-POOR_COST = DOUBTFUL * (1 + 1e-9)
-"""Cost above which a link is poor. What arrives there and back on a link of just this cost is one
-half, as a product of two powers of two, which is more or less than that in its last digit."""
 DEAF_COST = 1e4
 """Cost of a link on which next to nothing arrives."""
 UNHEARD_S = PRESENT_S
@@ -97,7 +94,7 @@ class Hearing:
                 if self._is_unheard(pair):
                     found = found or pair
                 continue
-            if cost <= POOR_COST:
+            if cost <= DOUBTFUL:
                 continue
             poor[pair] = self._poor_since.get(pair, now)
             is_apart = self._were_here(self._heard, pair, poor[pair], POOR_S)

@@ -168,7 +168,9 @@ class LsaTable:
             there = self._held.get(other)
             back = MAX_LOSS if there is None else there.losses.get(node, MAX_LOSS)
             if loss < MAX_LOSS and back < MAX_LOSS:
-                links[other] = cost_of(share_of(loss), share_of(back))
+                # Their sum, as losses are logarithms: which way loses more must not matter, not
+                # even in the last digit.
+                links[other] = cost_of(share_of(loss + back))
         return links
 
 
