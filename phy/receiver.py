@@ -46,8 +46,8 @@ class Receiver:
     networks than `network` are reported but not decoded; None accepts all. `centre_cycles` is the
     centre frequency in cycles per sample, if senders derive centre frequency and sample rate from
     one crystal: then the frequency offset also gives the error of the sampling clock. 0: unknown.
-    `on_points` gets the equalised points `[n, n_data]` of payload symbols, for plots. `expected`
-    bounds what headers may claim; None believes all.
+    `on_points` gets the equalised points `[n, n_data]` of payload symbols, for plots; it may be set
+    later, too. `expected` bounds what headers may claim; None believes all.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Receiver:
     ) -> None:
         self._screening = Screening(network, expected, start)
         self._grid = grid
-        self._on_points = on_points
+        self.on_points = on_points
         self._acquisition = Acquisition(grid, max_frequency, centre_cycles)
         self._demodulator = Demodulator(grid)
         self._powers = np.empty(SLIP_EVERY, np.float32)
@@ -238,8 +238,8 @@ class Receiver:
         plan, found, first = burst.plan, burst.acquired, burst.n_symbols_in
         last, n_pdus = burst.complete(self._stream.end)
         begin, n = burst.window(first), last - first
-        points = None
-        if self._on_points is not None:
+        points, on_points = None, self.on_points
+        if on_points is not None:
             points = np.empty((n, self._grid.n_data), np.complex64)
         self._demodulator.demodulate(
             self._stream.view(begin, burst.end_of(last)),
@@ -253,8 +253,8 @@ class Receiver:
             self._powers,
             points,
         )
-        if self._on_points is not None and points is not None:
-            self._on_points(points, plan.mcs.modulation)
+        if on_points is not None and points is not None:
+            on_points(points, plan.mcs.modulation)
         for data in self._decoder.decode(n_pdus):
             number = burst.n_good + burst.n_bad
             through = plan.symbols_through(number + 1)

@@ -8,6 +8,7 @@ from sdrlinkd.client import ControlClient, NoDaemonError, RefusedError
 from sdrlinkd.reports import Snapshot
 
 PATIENCE_S = 1.0
+_decode = msgspec.msgpack.Decoder(Snapshot).decode
 
 
 def ask_status(control: ControlClient) -> Snapshot:
@@ -15,7 +16,7 @@ def ask_status(control: ControlClient) -> Snapshot:
 
     Raises NoDaemonError, RefusedError, and msgspec.ValidationError if it is of another version.
     """
-    return msgspec.convert(control.ask("status"), Snapshot)
+    return _decode(control.ask_packed("status"))
 
 
 def snapshot_at(directory: Path | str | None, patience_s: float = PATIENCE_S) -> Snapshot | None:

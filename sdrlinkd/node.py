@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from sdrlinkd import __version__
+from sdrlinkd.airwatch import AirWatch
 from sdrlinkd.bus import Bus, Ingress
 from sdrlinkd.config import Setup
 from sdrlinkd.health import Health
@@ -45,9 +46,8 @@ log = logging.getLogger("sdrlinkd")
 class Node:
     """Connects the link, the bus and the PDU link; it has no queue and takes no decision itself.
 
-    `types` knows which messages begin with a std_msgs/Header, and the stop messages of command
-    topics, for when they fall silent. `chrony` receives samples of another robot's clock. `keeping`
-    keeps the state of keys.
+    `types` knows which messages begin with a std_msgs/Header, and the stop messages of commands.
+    `chrony` receives samples of another robot's clock. `keeping` keeps the state of keys.
     """
 
     def __init__(
@@ -78,6 +78,7 @@ class Node:
         self._draining = False
         self.bus = open_bus(self)
         self._wanting = Wanting(setup, link, self.bus)
+        self._air = AirWatch(self.bus, lambda: self._pdu_link)
 
     @property
     def _pdu_link(self) -> PduLink:
@@ -131,9 +132,8 @@ class Node:
         """Take PDUs from the air, and publish the messages that they complete."""
         now, now_ns = at_once(self._pdu_link.now, time.time_ns)
         link = self._link
+        self._air.heard(pdus)
         for data, at, snr_db, ended_at in pdus:
-            if self.bus.is_tapped:
-                self.bus.tap("rx", data)
             messages = link.hear(data, at, snr_db, now, ended_at)
             # First, as the PDU may bring both a new meaning of a number and messages of it.
             self.bus.forget_topics(link.take_changed_topics())
@@ -160,6 +160,7 @@ class Node:
                     self._link.submit(topic_id, gathered, now)
                     self._pdu_link.wake()
             self._wanting.look()
+            self._air.look()
             if self._keeping is not None:
                 self._keeping.look(now, at_once=self._is_lockstep)
             self._link.handle_timers(now)
@@ -171,9 +172,7 @@ class Node:
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The next burst, decided now; None if there is none."""
         burst = self._link.next_burst(opportunity)
-        if burst is not None and self.bus.is_tapped:
-            for data in burst.pdus:
-                self.bus.tap("tx", data)
+        self._air.composed(burst)
         return burst
 
     def next_wakeup(self, now: float) -> float:
@@ -183,6 +182,7 @@ class Node:
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
         """Report the outcome of a burst to the link."""
         self._link.confirm(burst, outcome, at)
+        self._air.settled(burst, outcome)
         self._tell_verdicts()
         self._queue_moved.set()
 

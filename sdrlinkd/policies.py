@@ -18,6 +18,8 @@ FIXED = ("dictionary", "from_", "offer", "stamp", "stop", "unproven")
 """Keys that cannot be changed at run time: receivers must know two of them, the stop message is
 made at the start, what is set wins over an offer anyway, and whom to trust is for the file."""
 
+_SETTABLE = [key for key in TopicPolicy.__struct_fields__ if key not in FIXED]
+
 
 class Policies:
     """Changes policies of single topics while the daemon runs."""
@@ -72,16 +74,20 @@ class Policies:
         """The name of a topic of this robot, with a leading slash."""
         return f"/{self._link.topic(topic_id).name}"
 
+    def policy(self, name: str) -> dict[str, Any]:
+        """The policy in force of a topic: the keys that can be set. Raises UserError."""
+        found = self._link.policy(self.topic_id(name))
+        return {key: _told(getattr(found, key)) for key in _SETTABLE}
+
     def set(self, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
         """Apply `changes`; returns the values before and after.
 
         Raises UserError and then changes nothing.
         """
         topic_id = self.topic_id(name)
-        known = [key for key in TopicPolicy.__struct_fields__ if key not in FIXED]
         for key in changes:
-            if key not in known:
-                raise UserError(f"{key}: cannot be set; allowed: {', '.join(known)}")
+            if key not in _SETTABLE:
+                raise UserError(f"{key}: cannot be set; allowed: {', '.join(_SETTABLE)}")
         old = self._link.policy(topic_id)
         merged = {**msgspec.to_builtins(old), **changes}
         try:

@@ -57,6 +57,9 @@ def make_verbs(
             raise UserError("set: nothing to change; name at least one key")
         return policies.set(str(arguments.get("topic", "")), changes)
 
+    def policy(arguments: dict[str, Any]) -> object:
+        return policies.policy(str(arguments.get("topic", "")))
+
     def why(arguments: dict[str, Any]) -> object:
         name = str(arguments.get("topic", ""))
         received = node.snapshot(control.requests).link.received
@@ -86,6 +89,7 @@ def make_verbs(
             "own topics that consumers at other robots subscribe to",
         ),
         "why": Verb(why, "explain in plain words what happens to a topic"),
+        "policy": Verb(policy, "a topic's policy in force"),
         "set": Verb(set_policy, "change a topic's policy", changes=True),
         "reload": Verb(
             reload_policies,

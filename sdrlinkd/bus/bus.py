@@ -53,6 +53,7 @@ ENVELOPE_ROOM = 4096
 """Octets of a bus message's frames, besides the payload, from which a program is cut off."""
 PDU_TAP = b"\0pdu\0"
 SENT_TAP = b"\0sent\0"
+AIR_TAP = b"\0air\0"
 
 
 class Bus:
@@ -74,8 +75,11 @@ class Bus:
         self._received = 0
         self._published = 0
         self._taps = 0
-        self._is_copied = False
-        """Whether a client watches the messages of this robot's producers."""
+        self.is_air_watched = False
+        """Whether a client watches what is on the air."""
+        self._copied: tuple[bytes, ...] = ()
+        """Subscriptions to copies of what this robot's producers send, SENT_TAP and beginnings of
+        topic frames."""
         self.filters: frozenset[bytes] = frozenset()
         """Subscriptions to messages from the air, each the beginning of a topic frame."""
         self.has_consumer = asyncio.Event()
@@ -180,6 +184,11 @@ class Bus:
         self._out.send_multipart([PDU_TAP, envelope.VERSION_BYTE + header, data])
         self._out_reader.recheck()
 
+    def tell_air(self, told: dict[str, object]) -> None:
+        """Publish what is on the air to the clients that watch it (bus document, 4.5)."""
+        self._out.send_multipart([AIR_TAP, envelope.VERSION_BYTE + msgspec.msgpack.encode(told)])
+        self._out_reader.recheck()
+
     def _frame_out(self, src: int, topic: HeardTopic) -> bytes:
         frame = self._frames_out.get((src, topic.base))
         if frame is None:
@@ -245,7 +254,7 @@ class Bus:
             return
         self._received += 1
         self._intake.take(frames)
-        if self._is_copied and len(frames) == 3:
+        if self._copied and len(frames) == 3 and (SENT_TAP + frames[0]).startswith(self._copied):
             self._out.send_multipart([SENT_TAP + frames[0], *frames[1:]])
 
     def _take_subscription(self, frames: list[bytes]) -> None:
@@ -253,8 +262,11 @@ class Bus:
         if topic == PDU_TAP:
             # XPUB reports only the first watcher to subscribe and the last one to leave.
             self._taps = int(subscribed)
-        elif topic == SENT_TAP:
-            self._is_copied = subscribed
+        elif topic == AIR_TAP:
+            self.is_air_watched = subscribed
+        elif topic.startswith(SENT_TAP):
+            others = tuple(each for each in self._copied if each != topic)
+            self._copied = (*others, topic) if subscribed else others
         elif subscribed and topic.startswith(ACK_PREFIX):
             # Subscriptions are processed in order, so the earlier ones are active now.
             self._acknowledge(topic)

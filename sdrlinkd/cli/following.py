@@ -5,18 +5,19 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NoReturn, Self
+from typing import Any, NoReturn, Self, TypeVar
 
-import msgspec
 from rich.console import RenderableType
 from rich.live import Live
 from rich.text import Text
 
+from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import connect
 from sdrlinkd.client import ControlClient, NoDaemonError, runtime_dir
 from sdrlinkd.reports import Snapshot
 from sdrlinkd.tables import screen_console
 
+T = TypeVar("T")
 WATCH_PERIOD_S = 0.5
 PATIENCE_S = 2.0
 """Longest wait for an answer in s; a slower daemon counts as away."""
@@ -33,7 +34,7 @@ class Follower:
     def look(self) -> Snapshot | None:
         """The daemon's present snapshot; None if it does not answer. Raises RefusedError."""
         try:
-            snapshot = msgspec.convert(self.ask("status"), Snapshot)
+            snapshot = self._with_client(ask_status)
         except NoDaemonError:
             if self._away_since is None:
                 self._away_since = time.monotonic()
@@ -43,10 +44,13 @@ class Follower:
 
     def ask(self, verb: str, arguments: dict[str, Any] | None = None) -> Any:  # noqa: ANN401
         """The daemon's answer to `verb`. Raises NoDaemonError and RefusedError."""
+        return self._with_client(lambda control: control.ask(verb, arguments))
+
+    def _with_client(self, ask: Callable[[ControlClient], T]) -> T:
         if self._control is None:
             self._control = connect(self.directory, PATIENCE_S)
         try:
-            return self._control.ask(verb, arguments)
+            return ask(self._control)
         except NoDaemonError:
             # A new connection shows at once whether a daemon is there.
             self.close()

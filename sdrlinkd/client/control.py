@@ -46,6 +46,10 @@ class ControlClient(Endpoint):
 
     def ask(self, verb: str, arguments: dict[str, Value] | None = None) -> Any:  # noqa: ANN401
         """The daemon's answer to `verb`. Raises RefusedError and, without answer, NoDaemonError."""
+        return unpack(self.ask_packed(verb, arguments))
+
+    def ask_packed(self, verb: str, arguments: dict[str, Value] | None = None) -> bytes:
+        """The daemon's answer to `verb` as MessagePack; raises as `ask` does."""
         request_id = secrets.token_bytes(4)
         deadline = time.monotonic() + self._timeout_s
         self._socket.sndtimeo = int(self._timeout_s * 1000)
@@ -61,8 +65,8 @@ class ControlClient(Endpoint):
             _, answered_id, status, body = self._socket.recv_multipart()
             # Skip a late answer to an earlier request that timed out.
             if answered_id == request_id:
-                answer = unpack(body)
                 if status != b"ok":
+                    answer = unpack(body)
                     raise RefusedError(answer["code"], answer["reason"])
-                return answer
+                return body
         raise no_daemon(self.runtime_dir)

@@ -19,6 +19,7 @@ from sdrlinkd.link.packing import flush_told, parity_pdus
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import (
     AS_CONFIGURED,
+    CLASSES,
     QOS_BY_LABEL,
     Overrides,
     Qos,
@@ -77,6 +78,7 @@ __all__ = [
     "AS_CONFIGURED",
     "AUCTION_PATIENCE",
     "CDR_HEADER_SIZE",
+    "CLASSES",
     "CLOCK_ERROR_S",
     "DEFAULT_POLICY",
     "IDLE_SHARE",

@@ -19,7 +19,7 @@ from sdrlinkd.modem.report import modem_report
 from sdrlinkd.modem.tempo import Tempo
 from sdrlinkd.modem.traits import pdu_link_traits
 from sdrlinkd.modem.turns import INFINITE, Turns
-from sdrlinkd.pdulink import Carry, Heard, PduListener
+from sdrlinkd.pdulink import Carry, Heard, Observe, PduListener
 from sdrlinkd.reports import PduLinkReport
 
 
@@ -59,6 +59,7 @@ class ModemLink:
         self._settled, self._is_refused = asyncio.Event(), asyncio.Event()
         self._state = "down"
         self._problem = ""
+        self._observe: Observe | None = None
 
     def now(self) -> float:
         """Time in s on the received stream's clock."""
@@ -70,6 +71,7 @@ class ModemLink:
         try:
             self._modem = await self._choose()
             can = self._can = await self._modem.open()
+            self._modem.observe(self._observe)
         except AbsentError as error:
             raise LinkAbsentError(str(error)) from None
         except RefusalError as error:
@@ -118,6 +120,11 @@ class ModemLink:
     def wake(self) -> None:
         """Check again whether there is something to send."""
         self._turns.wake()
+
+    def observe(self, tell: Observe | None) -> None:
+        """Call `tell` with what is on the air, some times a second; None: no longer."""
+        self._observe = tell
+        self._modem.observe(tell)
 
     async def idle(self) -> None:
         """Wait until every burst handed over is settled."""

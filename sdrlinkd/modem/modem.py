@@ -7,7 +7,7 @@ import phy
 from backends import Capabilities
 from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem.clock import Seen
-from sdrlinkd.pdulink import Heard
+from sdrlinkd.pdulink import Heard, Observe
 
 COUNTERS = (
     "overflows",
@@ -119,6 +119,9 @@ class Modem(Protocol):
     def send(self, order: BurstOrder) -> None:
         """Send a burst; `left` follows."""
 
+    def observe(self, tell: Observe | None) -> None:
+        """Call `tell` with what is on the air, some times a second; None: no longer."""
+
     async def close(self) -> None:
         """Close the radio; bursts that have not left are not reported. Closing twice is fine."""
 
@@ -143,6 +146,9 @@ class NoModem:
     def send(self, order: BurstOrder) -> None:
         """Raise RuntimeError: there is no modem yet."""
         raise RuntimeError(f"no modem yet for burst {order.number}")
+
+    def observe(self, tell: Observe | None) -> None:
+        """There is nothing to see."""
 
     async def close(self) -> None:
         """There is nothing to close."""

@@ -19,6 +19,46 @@ class Heard(NamedTuple):
     ended_at: float | None = None
 
 
+class BurstSeen(NamedTuple):
+    """A burst on the air whose header was read; times in s on the link's clock.
+
+    `ending`: whole, faded (its power vanished), cut (samples are missing), or foreign (of another
+    network).
+    """
+
+    at: float
+    length_s: float
+    mcs: int
+    n_pdus: int
+    n_good: int
+    snr_db: float
+    rssi_dbfs: float
+    ending: str
+
+
+class AirSeen(NamedTuple):
+    """What a modem has seen of the air since it last said so, for people.
+
+    `mean` and `peak` are levels of equal parts of the band, as int8 in dB relative to full scale,
+    the lowest frequency first. `points` are pairs of int8: the last equalised points, in 1/32 of
+    the mean amplitude.
+    """
+
+    until: float
+    """End of what was seen, in s on the link's clock."""
+    rate_hz: float
+    bursts: list[BurstSeen]
+    mean: bytes
+    peak: bytes
+    points: bytes
+    modulation: str
+    n_unreadable: int
+    """Preambles without a readable header, of bursts that were too weak or collided."""
+
+
+Observe = Callable[[AirSeen], None]
+
+
 class PduListener(Protocol):
     """The user of a PDU link. Its methods are called on the event loop and must not wait."""
 
@@ -67,6 +107,12 @@ class PduLink(Protocol):
 
     def wake(self) -> None:
         """Check again whether there is something to send."""
+
+    def observe(self, tell: Observe | None) -> None:
+        """Call `tell` with what is on the air, some times a second; None: no longer.
+
+        A link without a modem has nothing to tell.
+        """
 
     async def idle(self) -> None:
         """Wait until every burst handed over is settled."""

@@ -8,7 +8,7 @@ from random import Random
 
 from sdrlinkd.config import DirectParams
 from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
-from sdrlinkd.pdulink.base import Carry, Heard, PduListener
+from sdrlinkd.pdulink.base import Carry, Heard, Observe, PduListener
 from sdrlinkd.pdulink.bell import Bell
 from sdrlinkd.pdulink.impairment import Impairment
 from sdrlinkd.reports import PduLinkReport
@@ -78,6 +78,9 @@ class DirectLink:
             self._later(airtime_s, partial(self._left, burst, start))
         else:
             self._left(burst, start)
+
+    def observe(self, tell: Observe | None) -> None:
+        """Nothing: there is no modem."""
 
     async def idle(self) -> None:
         """Wait until every burst handed over is settled."""

@@ -106,7 +106,7 @@ from sdrlinkd.wire.later import (
     with_seq,
 )
 from sdrlinkd.wire.partials import Lost, Partial, ReassemblyLimits
-from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse
+from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse, source_and_class
 from sdrlinkd.wire.readable import ControlEntries, numbered, read_control_entries, with_topic
 from sdrlinkd.wire.reassembly import Reassembly
 from sdrlinkd.wire.record_types import (
@@ -359,6 +359,7 @@ __all__ = [
     "read_control_entries",
     "relayed",
     "share_of",
+    "source_and_class",
     "tellable",
     "topic_type",
     "with_seq",

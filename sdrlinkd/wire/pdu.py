@@ -115,6 +115,11 @@ def identity(data: bytes | bytearray) -> tuple[int, int, int]:
     return data[1], data[3], crc ^ _hop_shares(len(data))[data[4] >> 4]
 
 
+def source_and_class(data: bytes) -> tuple[int, int]:
+    """(src, Q field) of an intact PDU, sealed or not."""
+    return data[1], (data[0] >> 2) & 3
+
+
 @lru_cache(maxsize=8)
 def _hop_shares(pdu_size: int) -> tuple[int, ...]:
     """What the values of the hop nibble contribute to the CRC-32."""

@@ -25,7 +25,7 @@ from sdrlinkd.modem.process.loading import Loading
 from sdrlinkd.modem.process.modem_here import ModemHere
 from sdrlinkd.modem.process.page import Page
 from sdrlinkd.modem.process.radios import make_radio
-from sdrlinkd.pdulink import Heard
+from sdrlinkd.pdulink import AirSeen, Heard
 
 SWITCH_INTERVAL_S = 1e-4
 """With the default, a busy event loop keeps the receiver waiting for 5 ms."""
@@ -137,6 +137,9 @@ class _Served:
         counters = [] if self._modem is None else self._modem.receiver_counters
         self._say(protocol.Delivered(end, list(heard), counters))
 
+    def _observed(self, seen: AirSeen) -> None:
+        self._say(protocol.Observed(seen))
+
     def left(self, report: BurstReport) -> None:
         """Pass the outcome of a burst on to the daemon."""
         self._say(protocol.Left(*report))
@@ -197,6 +200,9 @@ class _Served:
                 self._start.set_result(message)
             elif isinstance(message, protocol.Begin):
                 self._has_begun.set()
+            elif isinstance(message, protocol.Observe):
+                if self._modem is not None:
+                    self._modem.observe(self._observed if message.is_on else None)
             elif self._modem is not None:
                 self._modem.send(BurstOrder(*msgspec.structs.astuple(message)))
 

@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 from typing import NoReturn
 
 import phy
@@ -20,10 +21,11 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Sensed
 from sdrlinkd.modem.clock import BlockTimes, Seen, StreamClock
 from sdrlinkd.modem.modem import BurstOrder, ModemStatus, ModemUser
+from sdrlinkd.modem.process.observer import Observer
 from sdrlinkd.modem.process.receiving import Call, Demodulation, ReceiverHere, ReceiverThread
 from sdrlinkd.modem.process.sensing_receiver import SensingReceiver
 from sdrlinkd.modem.process.transmission import Transmission
-from sdrlinkd.pdulink import Heard
+from sdrlinkd.pdulink import Heard, Observe
 
 MISSES_PER_S = 1000
 """Acquisitions a second that may bring nothing: a tenth of a core."""
@@ -174,6 +176,20 @@ class ModemHere:
         if self._tx is None:
             raise RuntimeError("send before open")
         self._tx.send(order)
+
+    def observe(self, tell: Observe | None) -> None:
+        """Call `tell` with what is on the air, by `call`; None: no longer."""
+        receiving, receiver = self._receiving, self._receiver
+        if receiving is None or receiver is None:
+            return
+        if receiving.observer is not None:
+            receiving.observer.stop()
+            receiving.observer = None
+        if tell is not None:
+            params, call = self._params, self._call
+            told = tell if call is None else partial(call, tell)
+            grid = phy.GRIDS[params.grid]
+            receiving.observer = Observer(receiver, grid, params.rate_hz, told)
 
     async def close(self) -> None:
         """Close the radio; bursts that have not left are not reported. Closing twice is fine."""

@@ -26,6 +26,7 @@ from sdrlinkd.modem.modem import BurstOrder, BurstReport, ModemStatus, ModemUser
 from sdrlinkd.modem.process import life, protocol
 from sdrlinkd.modem.process.modem_here import forever
 from sdrlinkd.modem.process.page import Page, Shown
+from sdrlinkd.pdulink import Observe
 from sdrlinkd.spawn import EarlyModem, spawn_modem
 
 END_S = 30.0
@@ -78,6 +79,7 @@ class ModemProcess:
         self._opened: asyncio.Future[Capabilities] | None = None
         self._over: asyncio.Future[None] | None = None
         self._user: ModemUser | None = None
+        self._observe: Observe | None = None
         self._hangs = self._is_closing = False
         # Received into, as a new buffer of the largest size for each message would cost more.
         self._room = memoryview(bytearray(protocol.MOST_BYTES))
@@ -153,6 +155,13 @@ class ModemProcess:
             lost = BurstReport(order.number, Outcome.LOST, order.start)
             if self._user is not None:
                 asyncio.get_running_loop().call_soon(self._user.left, lost)
+
+    def observe(self, tell: Observe | None) -> None:
+        """Call `tell` with what is on the air, some times a second; None: no longer."""
+        was_on, self._observe = self._observe is not None, tell
+        if was_on != (tell is not None):
+            with contextlib.suppress(BlockingIOError):
+                self._say(protocol.Observe(tell is not None))
 
     async def close(self) -> None:
         """Close the radio; bursts that have not left are not reported. Closing twice is fine."""
@@ -233,6 +242,9 @@ class ModemProcess:
                 user.left(BurstReport(*msgspec.structs.astuple(message)))
         elif isinstance(message, protocol.Status):
             self._status = ModemStatus(*msgspec.structs.astuple(message))
+        elif isinstance(message, protocol.Observed):
+            if self._observe is not None:
+                self._observe(message.seen)
         elif isinstance(message, protocol.Ended):
             if user is not None:
                 user.ended(message.problem, message.is_refusal)

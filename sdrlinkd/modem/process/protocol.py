@@ -1,6 +1,7 @@
 """Messages between a daemon and its modem process, on a socket that keeps their boundaries.
 
-The daemon sends Start, then Begin once it wants samples, then one Order for each burst. The process
+The daemon sends Start, then Begin once it wants samples, then one Order for each burst, and Observe
+when somebody begins or ends to watch the air, of which Observed then tells. The process
 answers Start with Opened or Failed, after Progress while it compiles and Waiting while its radio is
 absent. From Begin on it sends Delivered for blocks that complete PDUs, Left for each burst, Status
 when something has changed, and Ended when its stream ends. Both sides are of one version: they are
@@ -15,7 +16,7 @@ import msgspec
 from backends import AbsentError, BackendError, Patience, RefusalError
 from sdrlinkd.link import Outcome
 from sdrlinkd.modem.modem import BurstOrder, ModemStatus
-from sdrlinkd.pdulink import Heard
+from sdrlinkd.pdulink import AirSeen, Heard
 
 MOST_BYTES = 1 << 18
 """Largest message: 63 PDUs of 2047 B, and some more."""
@@ -53,6 +54,12 @@ class Order(msgspec.Struct, frozen=True, array_like=True, tag="order"):
     mcs: int
     pdus: list[bytes]
     n_timed: int
+
+
+class Observe(msgspec.Struct, frozen=True, array_like=True, tag="observe"):
+    """Whether the daemon wants to know what is on the air."""
+
+    is_on: bool
 
 
 class Progress(msgspec.Struct, frozen=True, array_like=True, tag="progress"):
@@ -131,6 +138,12 @@ class Status(msgspec.Struct, frozen=True, array_like=True, tag="status"):
     advice: str
 
 
+class Observed(msgspec.Struct, frozen=True, array_like=True, tag="observed"):
+    """What is on the air."""
+
+    seen: AirSeen
+
+
 class Ended(msgspec.Struct, frozen=True, array_like=True, tag="ended"):
     """The stream has ended; `problem` is empty at the end of a recording."""
 
@@ -159,8 +172,8 @@ def status_of(status: ModemStatus) -> Status:
     )
 
 
-ToModem = Start | Begin | Order
-FromModem = Progress | Opened | Failed | Delivered | Left | Status | Ended
+ToModem = Start | Begin | Order | Observe
+FromModem = Progress | Opened | Failed | Delivered | Left | Status | Observed | Ended
 
 encode = msgspec.msgpack.Encoder().encode
 _to_modem = msgspec.msgpack.Decoder(ToModem)

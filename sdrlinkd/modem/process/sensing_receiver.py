@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import phy
 from backends import SENDING, RxBlock
 from sdrlinkd.link import Sensed
+from sdrlinkd.modem.process.observer import Observer
 
 # The energy of a burst may seem to end later than its header says, by this many samples.
 TAIL = 2 * phy.SENSE_WINDOW
@@ -24,6 +25,8 @@ class SensingReceiver:
         self._sense = sense
         self._rate_hz = rate_hz
         self._unheard_until = 0
+        self.observer: Observer | None = None
+        """Looks at what comes; may be changed from any thread."""
         self.sensed = Sensed() if sense is None else Sensed(until=0.0)
         """State of the channel after the last block; may be read from any thread."""
 
@@ -42,6 +45,8 @@ class SensingReceiver:
                 self._sense.push(block.samples)
         if self._sense is not None:
             self.sensed = self._sense_air(self._sense)
+        if (observer := self.observer) is not None:
+            observer.take(block, events)
         return events
 
     def flush(self) -> Sequence[phy.Event]:

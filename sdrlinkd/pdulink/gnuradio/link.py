@@ -6,7 +6,7 @@ from functools import partial
 
 from sdrlinkd.config import GnuRadioParams
 from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
-from sdrlinkd.pdulink.base import Carry, Heard, PduListener
+from sdrlinkd.pdulink.base import Carry, Heard, Observe, PduListener
 from sdrlinkd.pdulink.bell import Bell
 from sdrlinkd.pdulink.gnuradio.transport import Transport
 from sdrlinkd.reports import PduLinkReport
@@ -69,6 +69,9 @@ class GnuRadioLink:
     def wake(self) -> None:
         """Check again whether there is something to send."""
         self._bell.ring()
+
+    def observe(self, tell: Observe | None) -> None:
+        """Nothing: there is no modem."""
 
     async def idle(self) -> None:
         """Wait until every burst handed over is settled."""
