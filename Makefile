@@ -30,13 +30,13 @@ $(STAMP): pyproject.toml constraints.txt sdrlinkd/__init__.py
 		{ echo "sdrlinkd needs Python 3.11 or newer; name one: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || \
 		{ echo "python3 has no venv module; on Debian: apt-get install python3-venv"; exit 1; }
-	$(PIP) -e '.[plots]'
+	$(PIP) -e '.[plots,web]'
 	@command -v cc >/dev/null || command -v gcc >/dev/null || command -v clang >/dev/null || $(PIP) ziglang
 	@$(BIN)/sdrlinkctl phy compile || echo "the modem will run on NumPy, slowly: install gcc, then sdrlinkctl phy compile"
 	@touch $@
 
 $(DEV_STAMP): $(STAMP)
-	$(PIP) -e '.[plots,dev]'
+	$(PIP) -e '.[plots,web,dev]'
 	@touch $@
 
 demo: setup
@@ -96,6 +96,7 @@ reference: $(DEV_STAMP)
 figures: $(DEV_STAMP)
 	$(BIN)/python -m benchmarks.page
 	$(BIN)/python -m docs.site.figures
+	$(BIN)/python -m docs.site.screens
 
 system-packages:
 	@sh etc/install-apt-packages.sh

@@ -10,7 +10,8 @@ from benchmarks.kept import FIGURES
 from benchmarks.latency.rows import ways
 from benchmarks.latency.session import Session
 from benchmarks.report import Drawing
-from sdrlinkd.pictures import COLORS, legend_beside, looks, make_figure, save
+from sdrlinkd.colors import COLORS
+from sdrlinkd.pictures import legend_beside, looks, make_figure, save
 
 COMMAND = "python -m benchmarks.latency"
 WAYS = {"fwd": "odometry, companion to FCU", "bwd": "IMU, FCU to companion"}

@@ -11,7 +11,8 @@ from benchmarks.peers.pound.control import EVERY, PERIOD_S, TICK_S, undelayed
 from benchmarks.pound import limits, loop, tables
 from benchmarks.pound.beside import LOOP_S
 from benchmarks.report import Drawing
-from sdrlinkd.pictures import COLORS, OURS, legend_beside, looks, make_figure, save
+from sdrlinkd.colors import COLORS
+from sdrlinkd.pictures import OURS, legend_beside, looks, make_figure, save
 
 COMMAND = "python -m benchmarks.pound"
 FLOWS = ("laser", "image")

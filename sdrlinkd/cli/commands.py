@@ -40,6 +40,7 @@ COMMANDS = {
         "Show who hears whom in the team, and who forwards what goes through this robot.",
         ("routes",),
     ),
+    "web": Listed("Serve a page with map, link and topics until Ctrl-C.", ("web",)),
     "exporter": Listed(
         "Serve the figures of this host's daemons to Prometheus until Ctrl-C.", ("exporter",)
     ),

@@ -1,5 +1,6 @@
 """`demo`: runs the paper's experiment on this machine."""
 
+from contextlib import ExitStack
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -13,6 +14,7 @@ from sdrlinkd import __version__
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
+from sdrlinkd.cli.page_beside import page_beside
 from sdrlinkd.demo import (
     DemoReport,
     Options,
@@ -117,6 +119,9 @@ def demo(
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write the report here.")
     ] = None,
+    web: Annotated[
+        bool, typer.Option("--web", help="Serve the page of the daemons while they run.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder for report.json and the pictures.")] = Path(
         "build/demo"
     ),
@@ -140,10 +145,13 @@ def demo(
         compile_first(console, engine.value)
         rate = rate or _measure(console, source, options)
         options = replace(options, rate_hz=rate)
-    for kind in kinds:
-        options = replace(options, link=kind.value)
-        result, traces[kind.value] = _run(console, source, options)
-        results.append(result)
+    with ExitStack() as stack:
+        if web:
+            _say(console, stack.enter_context(page_beside()))
+        for kind in kinds:
+            options = replace(options, link=kind.value)
+            result, traces[kind.value] = _run(console, source, options)
+            results.append(result)
     source.recording.close()
     told = DemoReport(version=__version__, runs=results)
     for path in (out / REPORT, json_file):

@@ -1,6 +1,7 @@
 """`lab`: runs a scenario with real daemons on one simulated air."""
 
 import time
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +15,7 @@ from sdrlinkd.cli.app import app
 from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
 from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario, scenario_names
+from sdrlinkd.cli.page_beside import page_beside
 from sdrlinkd.lab import (
     LabOptions,
     LabReport,
@@ -66,6 +68,9 @@ def lab(
     access: Annotated[
         Policy | None, typer.Option(help="Access policy; default: that of the scenario.")
     ] = None,
+    web: Annotated[
+        bool, typer.Option("--web", help="Serve the page of the daemons while they run.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder for report.json and lab.png.")] = Path(
         "build/lab"
     ),
@@ -85,7 +90,10 @@ def lab(
     title = chosen.title or scenario.stem
     compile_first(console)
     began = time.monotonic()
-    with Live(console=console, auto_refresh=False, transient=True) as live:
+    with (
+        ExitStack() as stack,
+        Live(console=console, auto_refresh=False, transient=True) as live,
+    ):
         starting = f"starting the hub and {len(chosen.robot)} robots"
         if console.is_terminal:
             live.update(Text(starting), refresh=True)
@@ -100,6 +108,9 @@ def lab(
                 others = "".join(f", {Path(each).name}" for each in told[1:])
                 hint = f"inspect one: sdrlinkctl latency --runtime-dir {told[0]}{others}"
                 console.print(hint, highlight=False, markup=False, soft_wrap=True)
+                if web:
+                    line = stack.enter_context(page_beside(map(Path, told)))
+                    console.print(line, highlight=False, markup=False, soft_wrap=True)
             if console.is_terminal:
                 live.update(live_table(title, state), refresh=True)
 

@@ -3,7 +3,8 @@
 from math import cos, pi, sin
 from pathlib import Path
 
-from sdrlinkd.pictures import COLORS, OURS, QUIET, make_figure, save
+from sdrlinkd.colors import COLORS
+from sdrlinkd.pictures import OURS, QUIET, make_figure, save
 from sdrlinkd.reports import RoutesReport
 
 SIZE = (5.0, 5.0)

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from sdrlinkd.colors import COLORS
 from sdrlinkd.demo.trace import Path2D, Trace, latencies_s
-from sdrlinkd.pictures import COLORS, OURS, legend_beside, looks, make_figure, save
+from sdrlinkd.pictures import OURS, legend_beside, looks, make_figure, save
 
 SENT_MARK_EVERY = 50
 

@@ -7,6 +7,7 @@ from urllib.parse import quote, unquote
 ROOT = "sdrlink"
 _ROBOT = re.compile(r"robot_(0|[1-9][0-9]{0,2})\Z")
 MOST_ROBOTS = 254
+_MOST_DIGITS = 3
 
 
 class TopicKey(NamedTuple):
@@ -40,6 +41,10 @@ class Keys:
     def gateway(self, gateway: int, what: str = "") -> str:
         """Of a gateway's token, or of `what` can be queried of it."""
         return f"{self.prefix}/@gw/{gateway}" + (f"/{what}" if what else "")
+
+    def every_gateway(self, what: str) -> str:
+        """Of `what` can be queried of each gateway."""
+        return f"{self.prefix}/@gw/*/{what}"
 
     @property
     def gateways(self) -> str:
@@ -81,11 +86,18 @@ class Keys:
         """The robot in the last chunk of a key; None if there is none."""
         return _robot(key.rpartition("/")[2])
 
+    def read_gateway(self, key: str) -> int | None:
+        """The gateway whose answer has this key; None for any other key."""
+        prefix, _, rest = key.partition(f"{self.prefix}/@gw/")
+        gateway, _, what = rest.partition("/")
+        is_one = not prefix and what and gateway.isdecimal() and len(gateway) <= _MOST_DIGITS
+        return int(gateway) if is_one else None
+
     def read_hears(self, key: str) -> tuple[int, int | None] | None:
         """(gateway, robot that it hears or None) in the key of a token; None for any other key."""
         prefix, _, rest = key.partition(f"{self.prefix}/@gw/")
         gateway, _, robot = rest.partition("/")
-        if prefix or not gateway.isdecimal() or len(gateway) > len(str(MOST_ROBOTS)):
+        if prefix or not gateway.isdecimal() or len(gateway) > _MOST_DIGITS:
             return None
         number = _robot(robot)
         return None if robot and number is None else (int(gateway), number)

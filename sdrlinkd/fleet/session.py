@@ -142,6 +142,15 @@ class Session:
 
         return self._keep(self._session.declare_queryable(key, asked))
 
+    async def get(self, key: str, within_s: float) -> list[Answer]:
+        """The answers to a query that come within so many seconds."""
+
+        def ask() -> list[Answer]:
+            replies = self._session.get(key, timeout=within_s)
+            return [_answer(each.ok) for each in replies if each.ok is not None]
+
+        return await asyncio.to_thread(ask)
+
     async def close(self) -> None:
         """Take everything down; what was put has a moment to leave."""
         for each in (*self._lanes.values(), self._answers):
@@ -210,6 +219,11 @@ class Session:
         self._transports += change
         if self.is_reached != was_reached:
             self.on_reach(self.is_reached)
+
+
+def _answer(sample: zenoh.Sample) -> Answer:
+    attachment = None if sample.attachment is None else sample.attachment.to_bytes()
+    return Answer(str(sample.key_expr), sample.payload.to_bytes(), attachment)
 
 
 async def open_session(params: FleetParams, folder: Path) -> Session:

@@ -16,6 +16,8 @@ from sdrlinkd.fleet.names import Duplicates
 from sdrlinkd.fleet.session import Sample, Session, open_session
 
 MOST_WAITING = 4096
+ANSWER_S = 2.0
+NOT_ENTERED = "enter the client with `async with` first"
 
 
 class FleetMessage(NamedTuple):
@@ -83,12 +85,23 @@ class FleetClient:
         class, by default that of the topic.
         """
         if self._session is None:
-            raise RuntimeError("enter the client with `async with` first")
+            raise RuntimeError(NOT_ENTERED)
         number = next(self._numbers)
         command = Command(self._operator, number, kind, qos, lifespan_ms)
         key = self._keys.message(robot, topic)
         self._session.put(key, cdr, encode(command), qos or "urgent")
         return number
+
+    async def ask_gateways(self, what: str, within_s: float = ANSWER_S) -> dict[int, bytes]:
+        """What each gateway answers: its `status`, or what it has `heard`, as JSON."""
+        if self._session is None:
+            raise RuntimeError(NOT_ENTERED)
+        found = {}
+        for each in await self._session.get(self._keys.every_gateway(what), within_s):
+            gateway = self._keys.read_gateway(each.key)
+            if gateway is not None:
+                found[gateway] = each.payload
+        return found
 
     def _take(self, sample: Sample) -> None:
         told, passed = self._keys.read_message(sample.key), read_passed(sample.attachment)

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 
 import phy
+from sdrlinkd.colors import COLORS
 from sdrlinkd.iq.recording import Points
 from sdrlinkd.iq.spectrum import Spectrum
-from sdrlinkd.pictures import COLORS, OURS, make_figure, save
+from sdrlinkd.pictures import OURS, make_figure, save
 
 # Dynamic range of the color scale, in dB below the strongest value.
 RANGE_DB = 70

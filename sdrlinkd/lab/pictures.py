@@ -7,10 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatter
 
 from phy import MCS_TABLE
+from sdrlinkd.colors import COLORS
 from sdrlinkd.lab.report import LabReport
 from sdrlinkd.lab.scenario import Scenario
 from sdrlinkd.lab.team_pictures import draw_classes, draw_hops
-from sdrlinkd.pictures import COLORS, OURS, QUIET, legend_beside, looks, make_figure, save
+from sdrlinkd.pictures import OURS, QUIET, legend_beside, looks, make_figure, save
 
 MOST_NAMED = 12
 """More series than that are drawn without names."""
