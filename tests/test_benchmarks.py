@@ -60,6 +60,7 @@ ROWS = {
         ),
         "hand_over_gap_s", "router_killed_s", "gateway_killed_s",
         "lost_50_robots", "twice_50_robots", "router_cpu_pct",
+        "page_desk_cpu_pct", "page_robot_cpu_pct",
     },
     "team": {
         "chain3_seed_mdr_laser", "chain3_seed_mdr_image", "chain3_seed_mdr_joystick",

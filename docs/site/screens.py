@@ -10,7 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from docs.site.browser import Browser
+from benchmarks.peers.browser import Browser
 from sdrlinkd.process import Process, module
 
 SCREENS = Path(__file__).parents[1] / "screens"

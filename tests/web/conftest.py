@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.site.browser import Browser
+from benchmarks.peers.browser import Browser
 from sdrlinkd.process import Process
 from tests.machine import lacks
 from tests.programs import sdrlinkctl
