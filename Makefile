@@ -83,7 +83,7 @@ wheel: $(DEV_STAMP)
 	$(BIN)/python -m hatchling build -t wheel
 	cd etc/client && ../../$(BIN)/python -m hatchling build -t wheel -d ../../dist
 
-deb: $(DEV_STAMP)
+deb:
 	sh etc/deb/build.sh
 
 bench: $(DEV_STAMP)

@@ -5,16 +5,17 @@
 # versions in constraints.txt. Plain dpkg-deb does it: debhelper and dh-virtualenv need a source package,
 # and would not shorten this.
 #
+# It needs gcc and python3-venv.
+#
 #   DEB_PYTHON     the system's Python that the environment is bound to; default: /usr/bin/python3
-#   DEB_COMPRESS   dpkg-deb's options; default: -Zxz
+#   DEB_BUILD      folder to build in, made anew; default: build/deb
 #   DEB_OUT        folder for the package; default: dist
 set -eu
 umask 022
 cd "$(dirname "$0")/../.."
 python=${DEB_PYTHON:-/usr/bin/python3}
-own=$PWD/.venv/bin
 home=/opt/sdrlinkd
-build=$PWD/build/deb
+build=${DEB_BUILD:-$PWD/build/deb}
 root=$build/root
 env=$root$home
 command -v dpkg-deb >/dev/null || { echo "make deb needs dpkg-deb: it runs on Debian and Ubuntu" >&2; exit 2; }
@@ -29,20 +30,25 @@ mkdir -p "$root" "$build/wheels"
 
 # The environment: its files lie below $root, and say that they lie in /opt/sdrlinkd.
 environment() {
-    families=$("$own/python" -c 'from phy.engine import targets
-print(*(each.name for each in targets.FAMILIES if each.is_of_this_machine))')
-    for each in $families; do "$own/sdrlinkctl" phy compile --for "$each"; done
-    "$own/python" -m hatchling build -t wheel -d "$build/wheels"
-    (cd etc/client && "$own/python" -m hatchling build -t wheel -d "$build/wheels")
+    "$python" -m venv "$build/tools"
+    tools=$build/tools/bin/python3
+    pip="$tools -m pip --quiet --disable-pip-version-check"
+    $pip install -c constraints.txt hatchling
+    "$tools" -m hatchling build -t wheel -d "$build/wheels"
+    (cd etc/client && "$tools" -m hatchling build -t wheel -d "$build/wheels")
     "$python" -m venv --without-pip "$env"
-    "$own/python" -m pip --python "$env/bin/python3" install --quiet --disable-pip-version-check \
-        --no-compile --no-warn-script-location -c constraints.txt \
+    $pip --python "$env/bin/python3" install --no-compile --no-warn-script-location -c constraints.txt \
         "$build"/wheels/sdrlinkd_client-*.whl "$(echo "$build"/wheels/sdrlinkd-*.whl)[plots,metrics,zenoh]"
     site=$(echo "$env"/lib/python3.*/site-packages)
-    # Libraries for this machine alone, or of an older source, are of no use elsewhere.
-    key=$("$own/python" -c 'from phy.engine import files; print(files.source_key())')
-    for each in "$site"/phy/engine/libraries/*.so; do
-        case " $families " in *" $(basename "$each" | sed -n "s/^kernels-\(.*\)-$key.so$/\1/p") "*) ;; *) rm "$each" ;; esac
+    # The modem for any machine of this architecture; a library for this one alone is of no use elsewhere.
+    rm -rf "$site/phy/engine/libraries"
+    mkdir "$site/phy/engine/libraries"
+    families=$(here -c 'from phy.engine import targets
+print(*(each.name for each in targets.FAMILIES if each.is_of_this_machine))')
+    for each in $families; do
+        here -m sdrlinkd.cli phy compile --for "$each"
+        library=$(here -c "from phy import engine; print(engine.place(engine.TARGETS['$each']))")
+        cp "$library" "$site/phy/engine/libraries/"
     done
     # Only our own programs are for people; scripts that activate an environment would name this folder.
     for each in "$env"/bin/*; do
@@ -50,11 +56,12 @@ print(*(each.name for each in targets.FAMILIES if each.is_of_this_machine))')
     done
     rm -f "$site"/*.dist-info/direct_url.json "$site"/*.dist-info/REQUESTED
     grep -rIl "$root" "$env/bin" "$env/pyvenv.cfg" | xargs sed -i "s|$root||g"
-    # Tests of libraries are a sixth of the environment.
-    find "$site" -depth -type d -name tests -exec rm -rf {} +
     # Bytecode, as nobody who runs this may write it: else each start of the daemon took a second more.
     "$python" -m compileall -q -j0 -s "$root" -p / --invalidation-mode unchecked-hash "$site"
 }
+
+# The environment's Python with the modules of this folder, where compiled libraries are kept.
+here() { PYTHONDONTWRITEBYTECODE=1 "$env/bin/python3" "$@"; }
 
 # What the rest of the system sees: programs, pages, completions, units, configuration.
 system() {
@@ -73,9 +80,11 @@ system() {
     install -m 644 etc/sdrlinkd.toml etc/registry.csv "$root/etc/sdrlinkd/"
     doc=$root/usr/share/doc/sdrlinkd
     install -D -m 644 etc/deb/copyright "$doc/copyright"
-    install -m 644 CHANGELOG.md "$doc/changelog"
+    install -m 644 CHANGELOG.md "$doc/"
+    printf 'sdrlinkd (%s) stable; urgency=medium\n\n  * See CHANGELOG.md.gz.\n\n -- %s  %s\n' "$version" \
+        "$(sed -n 's/^Maintainer: //p' etc/deb/control)" "$(date -uRd "@$SOURCE_DATE_EPOCH")" > "$doc/changelog"
     install -D -m 644 etc/deb/lintian-overrides "$root/usr/share/lintian/overrides/sdrlinkd"
-    gzip -9n "$doc/changelog" "$root"/usr/share/man/man*/*
+    gzip -9n "$doc"/CHANGELOG.md "$doc/changelog" "$root"/usr/share/man/man*/*
 }
 
 # A shell finds them by their names. zsh reads the first line, and calls the file as the completion itself.
@@ -84,7 +93,7 @@ completion() {
         to=$root/$(echo "$2" | sed "s/%/$each/")
         mkdir -p "$(dirname "$to")"
         variable="_$(echo "$each" | tr 'a-z-' 'A-Z_')_COMPLETE"
-        env "$variable=source_$1" "$own/$each" | sed '/./,$!d' > "$to"
+        env "$variable=source_$1" "$env/bin/python3" "$env/bin/$each" | sed '/./,$!d' > "$to"
         [ "$1" != zsh ] || echo "_$(echo "$each" | tr - _)_completion" >> "$to"
     done
 }
@@ -104,5 +113,5 @@ environment
 system
 control
 mkdir -p "${DEB_OUT:-dist}"
-# shellcheck disable=SC2086
-dpkg-deb --root-owner-group ${DEB_COMPRESS:--Zxz} --build "$root" "${DEB_OUT:-dist}/sdrlinkd_${version}_$arch.deb"
+# zstd: every system that the package is for reads it, and a small computer unpacks it in seconds.
+dpkg-deb --root-owner-group -Zzstd -z9 --build "$root" "${DEB_OUT:-dist}/sdrlinkd_${version}_$arch.deb"
