@@ -4,6 +4,7 @@
 # handed in.
 #
 #   sh etc/minimal-debian.sh make FOLDER SUITE [PACKAGE…]
+#       of the architecture $DEBIAN_ARCH; default: this machine's
 #   sh etc/minimal-debian.sh run FOLDER USER COMMAND    a line for sh, at home; nothing outlives it
 set -eu
 action=$1 root=$2
@@ -32,7 +33,8 @@ make_it() {
     command -v mmdebstrap >/dev/null || { echo "mmdebstrap is missing: apt-get install mmdebstrap" >&2; exit 2; }
     suite=$1
     shift
-    sources "$suite" | mmdebstrap --quiet --variant=minbase --include="$(echo "ca-certificates $*" | tr ' ' ,)" \
+    sources "$suite" | mmdebstrap --quiet --variant=minbase \
+        --architectures="${DEBIAN_ARCH:-$(dpkg --print-architecture)}" --include="$(echo "ca-certificates $*" | tr ' ' ,)" \
         "$suite" "$root" -
     chroot "$root" useradd --create-home --shell /bin/sh robot
 }
