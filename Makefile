@@ -61,8 +61,9 @@ fuzz: $(DEV_STAMP)
 	$(BIN)/python -m tests.fuzz $(or $(SECONDS),600)
 	SDRLINK_TRIALS=300 $(PYTEST) --timeout=0 -m hypothesis $(TESTS)
 
-fresh:
+fresh: $(DEV_STAMP)
 	sh etc/fresh.sh
+	SDRLINK_ARM64=1 $(BIN)/python -m pytest tests/packages/test_arm64.py
 
 check: $(DEV_STAMP)
 	$(BIN)/ruff format --check .

@@ -1,12 +1,15 @@
 """What takes a minute to make is made once, whichever process needs it first."""
 
 import fcntl
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.packages.debian import ROOT, Debian, call, lacking
+
+GIVEN = "SDRLINK_DEB"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -49,9 +52,11 @@ def base(once) -> Debian:
 
 @pytest.fixture(scope="session")
 def deb(once) -> Path:
-    """The package, as `make deb` makes it."""
+    """The package, as `make deb` makes it; or the one that GIVEN names."""
     if why := lacking():
         pytest.skip(why)
+    if given := os.environ.get(GIVEN):
+        return Path(given)
 
     def build(folder: Path) -> None:
         paths = {"DEB_BUILD": str(folder / "build"), "DEB_OUT": str(folder / "out")}

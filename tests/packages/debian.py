@@ -5,7 +5,7 @@ import os
 import shutil
 import subprocess
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tests.machine import ROOT as NEEDS_ROOT
@@ -13,7 +13,8 @@ from tests.machine import lacks
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "etc/minimal-debian.sh"
-PATIENCE_S = 600
+EMULATE = ROOT / "etc/emulate-arm64.sh"
+PATIENCE_S = 3600
 OF_APT = ("/var/lib/apt/", "/var/lib/dpkg/", "/var/cache/", "/var/log/", "/tmp/", "/dev/shm/")
 """What apt and dpkg keep for themselves, and files of the tests."""
 
@@ -51,27 +52,33 @@ def call(*command, **more):
 
 @dataclass(frozen=True)
 class Debian:
-    """The system in the folder `path`."""
+    """The system in the folder `path`, of the host's architecture or, emulated, for 64-bit ARM."""
 
     path: Path
+    is_arm64: bool = False
 
     @classmethod
-    def new(cls, path, *packages):
+    def new(cls, path, *packages, is_arm64=False):
         """Make one with these packages."""
-        call("sh", SCRIPT, "make", path, suite(), *packages)
-        made = cls(path)
+        made = cls(path, is_arm64)
+        made._call("make", path, suite(), *packages)
         # Whoever installs a package has lists of packages.
         made.run("apt-get update -qq")
         return made
 
+    def _call(self, *words):
+        if not self.is_arm64:
+            return call("sh", SCRIPT, *words)
+        return call("env", "DEBIAN_ARCH=arm64", "sh", EMULATE, "sh", SCRIPT, *words)
+
     def copy(self, path):
         """The same system in another folder."""
         call("cp", "-a", self.path, path)
-        return Debian(path)
+        return replace(self, path=path)
 
     def run(self, line, user="root"):
         """Output of a line that `user` types; it must succeed."""
-        return call("sh", SCRIPT, "run", self.path, user, line)
+        return self._call("run", self.path, user, line)
 
     def install(self, *packages):
         """Install packages of the archive, or files of the host's."""
