@@ -63,7 +63,7 @@ fuzz: $(DEV_STAMP)
 
 fresh: $(DEV_STAMP)
 	sh etc/fresh.sh
-	SDRLINK_ARM64=1 $(BIN)/python -m pytest tests/packages/test_arm64.py
+	SDRLINK_FRESH=1 $(BIN)/python -m pytest tests/packages
 
 check: $(DEV_STAMP)
 	$(BIN)/ruff format --check .

