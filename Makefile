@@ -1,7 +1,8 @@
 # make demo   set up, then the main job        make check  format, lint, types, import rules, prose, site
 # make quick  set up, then what every edit wants; make test  all tests; make soak, make fuzz  for hours
 # make bench  measurements beside peers        make fresh  README's commands on a minimal Debian (root)
-# make wheel  dist/*.whl, the modem compiled for x86-64 and 64-bit ARM
+# make wheel  dist/*.whl, the modem compiled for x86-64 and 64-bit ARM; and the client alone
+# make deb    dist/*.deb for the Debian or Ubuntu that it runs on
 # make docs   the site, into build/site        make reference, make figures  pages made from the code, pictures
 PYTHON ?= python3
 VENV := .venv
@@ -21,7 +22,7 @@ PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 8
 # pytest ends with 5 if a part has no such tests.
 IF_ANY := || test $$? -eq 5
 
-.PHONY: setup demo quick test soak fuzz fresh check format wheel bench docs reference figures system-packages clean
+.PHONY: setup demo quick test soak fuzz fresh check format wheel deb bench docs reference figures system-packages clean
 
 setup: $(STAMP)
 
@@ -60,8 +61,9 @@ fuzz: $(DEV_STAMP)
 	$(BIN)/python -m tests.fuzz $(or $(SECONDS),600)
 	SDRLINK_TRIALS=300 $(PYTEST) --timeout=0 -m hypothesis $(TESTS)
 
-fresh:
+fresh: $(DEV_STAMP)
 	sh etc/fresh.sh
+	SDRLINK_FRESH=1 $(BIN)/python -m pytest tests/packages
 
 check: $(DEV_STAMP)
 	$(BIN)/ruff format --check .
@@ -80,6 +82,10 @@ wheel: $(DEV_STAMP)
 	rm -rf phy/engine/libraries
 	for each in x86-64-v3 x86-64 aarch64; do $(BIN)/sdrlinkctl phy compile --for $$each || exit 1; done
 	$(BIN)/python -m hatchling build -t wheel
+	cd etc/client && ../../$(BIN)/python -m hatchling build -t wheel -d ../../dist
+
+deb:
+	sh etc/deb/build.sh
 
 bench: $(DEV_STAMP)
 	$(BIN)/python -m benchmarks

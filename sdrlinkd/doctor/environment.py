@@ -58,7 +58,7 @@ def _packages(requirements: list[str], version_of: Callable[[str], str]) -> Find
         if least and _numbers(version) < _numbers(least):
             wrong.append(f"{name} {version} is older than {least}")
     if wrong:
-        return bad("packages", ", ".join(wrong), "reinstall sdrlinkd: pip install .")
+        return bad("packages", ", ".join(wrong), "reinstall sdrlinkd: pip install ./etc/client .")
     return good("packages", f"{count}, all installed")
 
 

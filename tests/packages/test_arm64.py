@@ -1,0 +1,33 @@
+"""The package for 64-bit ARM, by qemu. `make fresh` runs it: it takes half an hour."""
+
+import json
+import shutil
+import sys
+
+import pytest
+
+from tests.machine import lacks
+from tests.packages.debian import BUILDER, ROOT, Debian, call, only_fresh
+
+DEMO = "sdrlinkctl demo --engine numpy --link ofdm --duration 2 --speed 0.05 --rate 1e5"
+"""Qemu is 10 to 20 times as slow as the machine, and so is NumPy beside the compiled modem."""
+
+
+@pytest.mark.timeout(7200)
+def test_the_package_for_64_bit_arm_installs_and_delivers_every_message(tmp_path):
+    only_fresh()
+    if shutil.which("qemu-aarch64-static") is None:
+        pytest.skip(lacks("qemu-user-static"))
+    # The host's compiler makes the modem; under qemu it would take as long as all the rest.
+    call(sys.executable, "-m", "sdrlinkd.cli", "phy", "compile", "--for", "aarch64", cwd=ROOT)
+    builder = Debian.new(tmp_path / "builder", *BUILDER, is_arm64=True)
+    clone = builder.path / "root/sdrlinkd"
+    call("git", "clone", "--quiet", "--no-hardlinks", ROOT, clone)
+    shutil.copytree(ROOT / "phy/engine/libraries", clone / "phy/engine/libraries")
+    builder.run("make -C sdrlinkd deb")
+    (deb,) = (clone / "dist").glob("sdrlinkd_*_arm64.deb")
+    robot = Debian.new(tmp_path / "robot", is_arm64=True)
+    robot.install(deb)
+    robot.run(DEMO, user="robot")
+    report = json.loads((robot.path / "home/robot/build/demo/report.json").read_text())
+    assert [each["pdr"] for each in report["runs"]] == [1.0]
