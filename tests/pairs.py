@@ -9,9 +9,9 @@ AIR = {"rate_hz": 1e6, "frequency_hz": 2.45e9, "block_s": 0.001}
 
 
 def on_air(hub, robot, more=""):
-    """The configuration of a robot on the air of `hub`; `more` begins with keys of the top."""
+    """The configuration of a robot on the air of `hub`; `more` is for the top."""
     return (
-        f'namespace = "robot_{robot}"\nbackend = "ether"\n{more}'
+        f'{more}namespace = "robot_{robot}"\nbackend = "ether"\n'
         f'[ether]\ndir = "{hub}"\n[modem]\nrate_hz = 1e6\n[access]\nnodes = [1, 2]\n'
     )
 

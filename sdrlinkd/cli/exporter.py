@@ -7,11 +7,12 @@ from typing import Annotated
 import typer
 
 from sdrlinkd.cli.app import app
+from sdrlinkd.cli.listening import address
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.errors import UserError
 
 NO_CLIENT = "the exporter needs prometheus-client: pip install 'sdrlinkd[metrics]'"
-MOST_PORT = 65535
+LISTEN = "127.0.0.1:9477"
 
 
 @app.command("exporter")
@@ -23,7 +24,7 @@ def exporter(
     ] = None,
     listen: Annotated[
         str, typer.Option(metavar="HOST:PORT", help="Where Prometheus asks.")
-    ] = "127.0.0.1:9477",
+    ] = LISTEN,
 ) -> None:  # fmt: skip
     """Serve the figures of this host's daemons to Prometheus until Ctrl-C."""
     try:
@@ -34,7 +35,7 @@ def exporter(
         if error.name != "prometheus_client":
             raise
         raise UserError(NO_CLIENT) from None
-    host, port = _address(listen)
+    host, port = address(listen, LISTEN)
     registry = CollectorRegistry()
     registry.register(Collector((lambda: runtime_dir) if runtime_dir else directories))
     try:
@@ -43,10 +44,3 @@ def exporter(
         raise UserError(f"--listen {listen}: {error.strerror}") from None
     typer.echo(f"metrics at http://{host}:{server.server_port}/metrics")
     threading.Event().wait()
-
-
-def _address(text: str) -> tuple[str, int]:
-    host, _, port = text.rpartition(":")
-    if not host or not port.isdecimal() or int(port) > MOST_PORT:
-        raise UserError(f'--listen: got "{text}"; allowed: HOST:PORT, such as 127.0.0.1:9477')
-    return host.strip("[]"), int(port)
