@@ -38,7 +38,7 @@ class Bridge:
         self._status = Channel(STATUS, schema=json_schema(Snapshot), context=context)
         self._about = Channel(BRIDGE, schema=json_schema(BridgeReport), context=context)
         self._slow = SlowClients()
-        self._operators = Operators(patterns, self._say, self._daemon.declare)
+        self._operators = Operators(patterns, self._say, self._daemon.declare, self._topics.again)
         self._server = start_server(host, port, context, self._operators)
         self.port = self._server.port
         """The port that clients connect to."""

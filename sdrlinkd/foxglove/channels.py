@@ -1,6 +1,7 @@
 """Channels of the topics that other robots send: their octets as they came, with ROS 2 schemas."""
 
 import logging
+from typing import NamedTuple
 
 from foxglove import Channel, Context, Schema
 
@@ -9,8 +10,15 @@ from sdrlinkd.client import Message
 
 MOST_CHANNELS = 1000
 """Most channels ever made: the SDK forgets none, and names come from the air."""
+MOST_KEPT_BYTES = 64 << 20
+"""Most octets of last messages, all topics together."""
 
 _log = logging.getLogger(__name__)
+
+
+class _Kept(NamedTuple):
+    payload: bytes
+    time_ns: int
 
 
 class ReceivedTopics:
@@ -20,6 +28,9 @@ class ReceivedTopics:
         self._context = context
         self._channels: dict[str, tuple[str, Channel]] = {}
         self._made = 0
+        self._kept: dict[str, _Kept] = {}
+        """The last message of each topic."""
+        self._kept_bytes = 0
         self.passed = 0
         """Messages passed on."""
         self.not_shown = 0
@@ -38,6 +49,25 @@ class ReceivedTopics:
             return
         channel.log(message.payload, log_time=message.received_ns)
         self.passed += 1
+        self._keep(message)
+
+    def again(self, topic: str, client: int) -> None:
+        """Give a client that subscribes to a topic the last message, as it missed the first ones.
+
+        A map and static transforms come only once.
+        """
+        kept = self._kept.get(topic)
+        if kept is not None:
+            # In this SDK the id of a client is that of its sink.
+            _, channel = self._channels[topic]
+            channel.log(kept.payload, log_time=kept.time_ns, sink_id=client)
+
+    def _keep(self, message: Message) -> None:
+        old = self._kept.pop(message.topic, None)
+        self._kept_bytes -= 0 if old is None else len(old.payload)
+        if self._kept_bytes + len(message.payload) <= MOST_KEPT_BYTES:
+            self._kept[message.topic] = _Kept(message.payload, message.received_ns)
+            self._kept_bytes += len(message.payload)
 
     def _open(self, topic: str, kind: str, old: Channel | None) -> Channel | None:
         """The channel of a topic that is new, or has got another type."""
@@ -47,6 +77,7 @@ class ReceivedTopics:
             return None
         if old is not None:
             old.close()
+            self._kept_bytes -= len(self._kept.pop(topic, _Kept(b"", 0)).payload)
         self._made += 1
         text = definition(kind)
         # A type that nobody here knows has a name and no definition.

@@ -43,6 +43,12 @@ def test_topics_come_with_their_schemas_and_their_very_octets(team):
         out.send("/robot_1/strange", odd)
         viewer.until(lambda: viewer.payloads("/rx_robot_1/odom")[-3:] == sent)
         viewer.until(lambda: viewer.payloads("/rx_robot_1/strange")[-1:] == [odd])
+    # Who comes later gets the last message, and nobody gets it twice.
+    with Viewer(team.url, "/rx_robot_1/*") as late:
+        late.until(lambda: late.payloads("/rx_robot_1/odom"))
+        late.until(lambda: late.payloads("/rx_robot_1/strange"))
+    assert late.payloads("/rx_robot_1/odom") == [sent[-1]]
+    assert late.payloads("/rx_robot_1/strange") == [odd]
     shown = viewer.channels["/rx_robot_1/odom"]
     assert (shown["encoding"], shown["schemaEncoding"]) == ("cdr", "ros2msg")
     assert shown["schemaName"] == ODOMETRY

@@ -64,6 +64,7 @@ def test_commands_are_judged_in_a_sentence():
     for given, words in refused.items():
         assert words in judge(*given, allowed), given
     assert "allowed: none; --publish" in judge("/robot_2/cmd_vel", "a/B", "cdr", [])
+    assert 'got "/a?b?"' in judge("/a\nb\x1b", "a/B", "cdr", [])
     assert len(judge("x" * 5000, "a/B", "cdr", [])) < 250
 
 
