@@ -43,10 +43,14 @@ def test_topics_come_with_their_schemas_and_their_very_octets(team):
         out.send("/robot_1/strange", odd)
         viewer.until(lambda: viewer.payloads("/rx_robot_1/odom")[-3:] == sent)
         viewer.until(lambda: viewer.payloads("/rx_robot_1/strange")[-1:] == [odd])
-    # Who comes later gets the last message, and nobody gets it twice.
-    with Viewer(team.url, "/rx_robot_1/*") as late:
-        late.until(lambda: late.payloads("/rx_robot_1/odom"))
-        late.until(lambda: late.payloads("/rx_robot_1/strange"))
+        # Who comes later gets the last message, and nobody else gets it again.
+        n = len(viewer.payloads("/rx_robot_1/strange"))
+        with Viewer(team.url, "/rx_robot_1/*") as late:
+            late.until(lambda: late.payloads("/rx_robot_1/odom"))
+            late.until(lambda: late.payloads("/rx_robot_1/strange"))
+        out.send("/robot_1/strange", CDR)
+        viewer.until(lambda: viewer.payloads("/rx_robot_1/strange")[-1:] == [CDR])
+        assert len(viewer.payloads("/rx_robot_1/strange")) == n + 1
     assert late.payloads("/rx_robot_1/odom") == [sent[-1]]
     assert late.payloads("/rx_robot_1/strange") == [odd]
     shown = viewer.channels["/rx_robot_1/odom"]
@@ -57,7 +61,8 @@ def test_topics_come_with_their_schemas_and_their_very_octets(team):
     assert types[ODOMETRY][1] == known[ODOMETRY][1]
     assert POSE.replace("Stamped", "") in types
     unheard = viewer.channels["/rx_robot_1/strange"]
-    assert (unheard["schemaName"], unheard["schema"]) == ("strange_msgs/msg/Unheard", "")
+    assert unheard["schemaName"] == "strange_msgs/msg/Unheard"
+    assert (unheard["schemaEncoding"], unheard["schema"]) == ("", "")
     assert viewer.info["capabilities"] == ["clientPublish"]
 
 
@@ -189,10 +194,12 @@ def _sentences(viewer):
 
 def test_a_topic_of_the_registry_is_sent_as_this_robots_own(start_daemon):
     daemon = start_daemon('namespace = "robot_2"\n')
-    with bridge_to(daemon, "--publish", "/*") as bridge, Viewer(url_of(bridge)) as viewer:
-        viewer.until(lambda: viewer.info)
+    with (
+        bridge_to(daemon, "--publish", "/*") as bridge,
+        Viewer(url_of(bridge), "/sdrlink/bridge") as viewer,
+    ):
+        viewer.until(lambda: any(each["has_daemon"] for each in _reports(viewer)))
         viewer.advertise(1, "/robot_9/cmd_vel")
-        wait_for(lambda: "listening to the daemon" in bridge.log())
         viewer.publish(1, CDR + bytes(48))
         wait_for(lambda: daemon.snapshot().link.tx.sent == 1)
         (sent,) = [each for each in daemon.snapshot().link.topics if each.sent]
@@ -213,6 +220,7 @@ def test_the_bridge_waits_for_the_daemon_and_goes_on(start_daemon):
 
     def comes(message):
         """Whether a message has come; it is sent anew, as ZeroMQ may still be connecting."""
+        out.send("/robot_1/imu", message)
         out.send("/robot_1/odom", message)
         return topic in viewer.channels and message in viewer.payloads(topic)
 
@@ -220,7 +228,7 @@ def test_the_bridge_waits_for_the_daemon_and_goes_on(start_daemon):
         return [each["has_daemon"] for each in _reports(viewer)][-1:]
 
     daemon.stop()
-    with bridge_to(daemon) as bridge, Viewer(url_of(bridge), topic, "/sdrlink/*") as viewer:
+    with bridge_to(daemon, topic) as bridge, Viewer(url_of(bridge), "*") as viewer:
         viewer.until(lambda: has_daemon() == [False])
         wait_for(lambda: "waiting for it" in bridge.log())
         for number in (1.0, 2.0):
@@ -230,5 +238,7 @@ def test_the_bridge_waits_for_the_daemon_and_goes_on(start_daemon):
                 viewer.until(lambda n=number: comes(odometry(n)))
             daemon.stop()
         viewer.until(lambda: has_daemon() == [False])
+        # What was not named is not shown, and was not subscribed to.
+        assert [each for each in viewer.channels if each.startswith("/rx_")] == [topic]
         assert bridge.is_running
         assert "Traceback" not in bridge.log()
