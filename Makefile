@@ -97,6 +97,8 @@ docs: $(DEV_STAMP)
 
 reference: $(DEV_STAMP)
 	$(BIN)/python -m docs.site.reference
+	$(BIN)/python -m docs.site.dashboards
+	$(BIN)/python -m docs.site.foxglove_layout
 
 # Drawn of what is kept in docs/measured (`python -m benchmarks.NAME --keep`), and of runs in lock-step.
 figures: $(DEV_STAMP)

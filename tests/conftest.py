@@ -1,5 +1,6 @@
 """Fixtures that several folders use: real daemons."""
 
+import contextlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -26,40 +27,46 @@ def _no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("COLUMNS", raising=False)
 
 
-@pytest.fixture
-def write_config() -> Callable[..., Path]:
-    """Writes a configuration with its sockets in the given folder and optional further TOML."""
-
-    def write(directory: Path, extra_toml: str = "") -> Path:
-        top, tables = [], extra_toml
-        while tables and not tables.startswith("["):
-            line, _, tables = tables.partition("\n")
-            top.append(line)
-        if not any(line.startswith("registry") for line in top):
-            top.append(f'registry = "{ETC / "registry.csv"}"')
-        config = directory / "sdrlinkd.toml"
-        config.write_text(
-            "\n".join([*top, "seed = 1", "[bus]", f'runtime_dir = "{directory}"', tables])
-        )
-        return config
-
-    return write
+def write_settings(directory: Path, extra_toml: str = "") -> Path:
+    """Write a configuration with its sockets in `directory` and optional further TOML."""
+    top, tables = [], extra_toml
+    while tables and not tables.startswith("["):
+        line, _, tables = tables.partition("\n")
+        top.append(line)
+    if not any(line.startswith("registry") for line in top):
+        top.append(f'registry = "{ETC / "registry.csv"}"')
+    config = directory / "sdrlinkd.toml"
+    config.write_text(
+        "\n".join([*top, "seed = 1", "[bus]", f'runtime_dir = "{directory}"', tables])
+    )
+    return config
 
 
-@pytest.fixture
-def start_daemon(
-    tmp_path_factory: pytest.TempPathFactory, write_config: Callable[..., Path]
-) -> Iterator[Callable[..., Daemon]]:
+@contextlib.contextmanager
+def daemons(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Daemon]]:
     """Starts daemons and stops them in order; each must end cleanly, without a traceback."""
     started: list[Daemon] = []
 
     def start(extra_toml: str = "", before: str = "") -> Daemon:
         """Start a daemon; `before` is Python code that it runs first."""
         directory = tmp_path_factory.mktemp("node")
-        daemon = Daemon(directory, write_config(directory, extra_toml), directory / "log", before)
+        daemon = Daemon(directory, write_settings(directory, extra_toml), directory / "log", before)
         started.append(daemon)
         return daemon.at_work()
 
     yield start
     for daemon in started:
         daemon.ends_well()
+
+
+@pytest.fixture
+def write_config() -> Callable[..., Path]:
+    """Writes a configuration with its sockets in the given folder and optional further TOML."""
+    return write_settings
+
+
+@pytest.fixture
+def start_daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Daemon]]:
+    """Starts daemons and stops them in order; each must end cleanly, without a traceback."""
+    with daemons(tmp_path_factory) as start:
+        yield start

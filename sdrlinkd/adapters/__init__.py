@@ -10,7 +10,7 @@ from sdrlinkd.adapters.recorder import BagWriter, Recorded
 from sdrlinkd.adapters.robot import BuiltInRobot
 from sdrlinkd.adapters.summary import BagSummary, TopicSummary, summarise
 from sdrlinkd.adapters.transforms import Transforms
-from sdrlinkd.adapters.typestore import empty, from_cdr, knows, to_cdr
+from sdrlinkd.adapters.typestore import definition, empty, from_cdr, knows, to_cdr
 
 __all__ = [
     "Bag",
@@ -26,6 +26,7 @@ __all__ = [
     "TopicSummary",
     "Transforms",
     "cdr_from_fields",
+    "definition",
     "due_messages",
     "empty",
     "first_seconds",

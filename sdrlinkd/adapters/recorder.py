@@ -10,7 +10,7 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 from ruamel.yaml import YAML
 
-from sdrlinkd.adapters.typestore import knows, ros2_types
+from sdrlinkd.adapters.typestore import definition
 from sdrlinkd.errors import BagError
 
 METADATA = "metadata.yaml"
@@ -185,9 +185,7 @@ class _File:
 
     def _schema(self, type_: str) -> int:
         if type_ not in self._schemas:
-            text = ""
-            if knows(type_):
-                text, _ = ros2_types().generate_msgdef(type_, ros_version=2)
+            text = definition(type_)
             self._schemas[type_] = self._writer.register_schema(
                 type_, "ros2msg" if text else "", text.encode()
             )

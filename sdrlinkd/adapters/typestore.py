@@ -21,6 +21,11 @@ def knows(kind: str) -> bool:
     return kind in ros2_types().fielddefs
 
 
+def definition(kind: str) -> str:
+    """The definition of `kind` and of the types in it, as rosbags' text; empty if unknown."""
+    return ros2_types().generate_msgdef(kind, ros_version=2)[0] if knows(kind) else ""
+
+
 def to_cdr(message: object, kind: str) -> bytes:
     """A message of `kind` as CDR bytes."""
     return bytes(ros2_types().serialize_cdr(message, kind))

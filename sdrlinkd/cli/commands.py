@@ -44,6 +44,7 @@ COMMANDS = {
     "exporter": Listed(
         "Serve the figures of this host's daemons to Prometheus until Ctrl-C.", ("exporter",)
     ),
+    "bridge": Listed("Show the link and what it carries in other programs.", ("bridge",)),
     "check": Listed(
         "Verify the running daemon's ledger; exit code 1 when it does not add up.", ("status",)
     ),

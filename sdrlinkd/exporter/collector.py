@@ -12,7 +12,16 @@ from prometheus_client.core import (
 )
 
 from sdrlinkd.asking import snapshot_at
-from sdrlinkd.exporter.families import Family, Labels, Sample, families, info, plain, samples
+from sdrlinkd.exporter.families import (
+    RUNTIME_DIR,
+    Family,
+    Labels,
+    Sample,
+    families,
+    info,
+    plain,
+    samples,
+)
 from sdrlinkd.exporter.names import PREFIX
 from sdrlinkd.reports import Snapshot
 
@@ -37,9 +46,7 @@ class Collector:
         """All metrics, family by family, each of all daemons."""
         found = {path: self._ask(path) for path in self._directories()}
         self._grown = {path: self._grown.get(path, _Grown()) for path in found}
-        up = GaugeMetricFamily(
-            f"{PREFIX}_up", "Whether the daemon answers.", labels=["runtime_dir"]
-        )
+        up = GaugeMetricFamily(f"{PREFIX}_up", "Whether the daemon answers.", labels=[RUNTIME_DIR])
         about = InfoMetricFamily(PREFIX, "Version and kind of the daemon.", labels=OF_DAEMON)
         made: dict[str, Metric] = {}
         for path, snapshot in found.items():
@@ -48,7 +55,7 @@ class Collector:
                 continue
             daemon = (str(snapshot.node), snapshot.namespace)
             figures = plain(snapshot)
-            about.add_metric(daemon, info(figures))
+            about.add_metric(daemon, info(figures) | {RUNTIME_DIR: str(path)})
             grown = self._grown[path].since(snapshot.uptime_s)
             for family, values in samples(figures):
                 if family.name not in made:

@@ -47,6 +47,8 @@ INFO = {
     "link.registry_digest": "registry_digest",
 }
 """Texts that are labels of sdrlink_info."""
+RUNTIME_DIR = "runtime_dir"
+"""Label of sdrlink_up, and of sdrlink_info: so a daemon that is gone still has the robot's id."""
 SKIPPED = ("node", "taken_at_unix_ns")
 """The first is a label of everything; Prometheus has a time of its own."""
 

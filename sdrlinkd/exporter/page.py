@@ -1,6 +1,6 @@
 """The reference page of the metrics."""
 
-from sdrlinkd.exporter.families import INFO, families
+from sdrlinkd.exporter.families import INFO, RUNTIME_DIR, families
 from sdrlinkd.exporter.names import PREFIX
 
 INTRODUCTION = f"""\
@@ -11,10 +11,10 @@ in base units. Each has the labels `node`, the robot's id, and `namespace`, and 
 braces. A state has a sample for each of its values, in a label of the metric's own name: 1 for the
 value in force.
 
-`{PREFIX}_up` {{runtime_dir}}
+`{PREFIX}_up` {{{RUNTIME_DIR}}}
 :   Whether the daemon answers. (gauge)
 
-`{PREFIX}_info` {{{", ".join(INFO.values())}}}
+`{PREFIX}_info` {{{", ".join([*INFO.values(), RUNTIME_DIR])}}}
 :   Version and kind of the daemon. (always 1)
 """
 

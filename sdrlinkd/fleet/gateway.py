@@ -10,10 +10,10 @@ import msgspec
 
 from sdrlinkd.client import Message
 from sdrlinkd.config import Setup
+from sdrlinkd.daemon_side import DaemonSide
 from sdrlinkd.errors import UserError
 from sdrlinkd.fleet.alarm import Alarm
 from sdrlinkd.fleet.commands import Order
-from sdrlinkd.fleet.daemon_side import DaemonSide
 from sdrlinkd.fleet.downward import DownwardCommands
 from sdrlinkd.fleet.election import Election, score
 from sdrlinkd.fleet.formats import encode, read_claim

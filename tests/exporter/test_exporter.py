@@ -3,12 +3,10 @@
 import json
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import urllib.request
 from pathlib import Path
-from urllib.parse import quote
 
 import msgspec
 import pytest
@@ -21,7 +19,6 @@ from sdrlinkd.client import Publisher
 from sdrlinkd.exporter import Collector, families, plain, samples
 from sdrlinkd.reports import TopicReport
 from tests.machine import lacks
-from tests.programs import sdrlinkctl
 from tests.waiting import wait_for
 
 RULES = Path(__file__).parents[2] / "etc/prometheus/sdrlink.rules.yml"
@@ -84,7 +81,8 @@ def test_every_figure_of_a_daemon_is_told_in_base_units(daemon):
     assert age == pytest.approx(heard.age_ms_p50 / 1000)
     assert only(told["sdrlink_verdict_level"], sdrlink_verdict_level="OK") == 1
     assert only(told["sdrlink_verdict_level"], sdrlink_verdict_level="DOWN") == 0
-    assert only(told["sdrlink_info"], version=snapshot.version, backend="direct") == 1
+    about = {"version": snapshot.version, "backend": "direct", "runtime_dir": "a"}
+    assert only(told["sdrlink_info"], **about) == 1
     assert {each.name for each, _ in samples(plain(snapshot))} >= {
         "uptime_seconds",
         "tx_queued_bytes",
@@ -123,11 +121,9 @@ def test_a_daemon_that_does_not_answer_is_down_and_the_others_are_told(daemon):
 
 
 @pytest.fixture
-def exporter(daemon):
+def exporter(daemon, start_exporter):
     """The address of an exporter for that daemon."""
-    at = ("--runtime-dir", daemon.directory, "--listen", "127.0.0.1:0")
-    with sdrlinkctl("exporter", *at) as process:
-        yield process.line().split()[-1]
+    return start_exporter(daemon)
 
 
 @needs_prometheus
@@ -139,47 +135,17 @@ def test_promtool_has_nothing_to_say_against_the_text(exporter):
 
 @needs_prometheus
 @pytest.mark.slow
-def test_prometheus_reads_it_and_evaluates_every_rule(exporter, tmp_path):
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{free.getsockname()[1]}"
-    config = {
-        "global": {"scrape_interval": "500ms", "evaluation_interval": "500ms"},
-        "rule_files": [str(RULES)],
-        "scrape_configs": [
-            {"job_name": "sdrlink", "static_configs": [{"targets": [exporter.split("/")[2]]}]}
-        ],
-    }
-    (tmp_path / "prometheus.yml").write_text(json.dumps(config))
-    log = (tmp_path / "log").open("w")
-    options = {
-        "config.file": tmp_path / "prometheus.yml",
-        "storage.tsdb.path": tmp_path / "data",
-        "web.listen-address": address,
-    }
-    command = ["prometheus", *(f"--{name}={value}" for name, value in options.items())]
-    server = subprocess.Popen(command, stdout=log, stderr=log)
-
-    def ask(path):
-        try:
-            return json.load(urllib.request.urlopen(f"http://{address}/api/v1/{path}", timeout=5))
-        except OSError:
-            return {"data": {"result": [], "groups": []}}
+def test_prometheus_reads_it_and_evaluates_every_rule(exporter, start_prometheus):
+    prometheus = start_prometheus(exporter, [RULES])
 
     def rules():
-        return [rule for group in ask("rules")["data"]["groups"] for rule in group["rules"]]
+        return [rule for group in prometheus.ask("rules")["groups"] for rule in group["rules"]]
 
-    try:
-        wait_for(lambda: ask("query?query=sdrlink_tx_sent_total")["data"]["result"], 60)
-        query = quote('sdrlink_topic_sent_total{topic=~".*odom"}')
-        (found,) = ask(f"query?query={query}")["data"]["result"]
-        assert found["value"][1] == "20"
-        wait_for(lambda: rules() and all(rule["health"] == "ok" for rule in rules()), 60)
-        assert {rule["state"] for rule in rules()} == {"inactive"}
-    finally:
-        server.terminate()
-        server.wait(20)
-        log.close()
+    wait_for(lambda: bool(prometheus.query("sdrlink_tx_sent_total")), 60)
+    (found,) = prometheus.query('sdrlink_topic_sent_total{topic=~".*odom"}')
+    assert found["value"][1] == "20"
+    wait_for(lambda: rules() and all(rule["health"] == "ok" for rule in rules()), 60)
+    assert {rule["state"] for rule in rules()} == {"inactive"}
 
 
 def test_an_address_that_is_none_and_a_missing_library_are_one_sentence(monkeypatch, capsys):

@@ -1,8 +1,8 @@
-"""The daemon beside a gateway: its messages, and what it says of the robots that it hears."""
+"""The daemon beside a gateway or a bridge: its messages, and what it says of itself."""
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from sdrlinkd.asking import snapshot_at
 from sdrlinkd.client import (
@@ -29,15 +29,17 @@ class DaemonSide:
         self.snapshot: Snapshot | None = None
         """The daemon's last report; None while it does not answer."""
 
-    async def listen(self, take: Callable[[Message], None]) -> None:
+    async def listen(self, take: Callable[[Message], None], topics: Sequence[str] = ()) -> None:
         """Call `take` for each message from the air; waits for the daemon if it is away.
+
+        `topics`: names on the bus, or prefixes with `*`; none: all.
 
         Raises UserError.
         """
         is_told = False
         while True:
             try:
-                async with AsyncSubscriber(runtime_dir=self._directory) as heard:
+                async with AsyncSubscriber(*topics, runtime_dir=self._directory) as heard:
                     _log.info("listening to the daemon at %s", heard.directory)
                     is_told = False
                     while True:
