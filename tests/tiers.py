@@ -11,6 +11,9 @@ from hypothesis import settings
 from tests.laws import law
 from tests.machine import left_out
 
+FRESH = "SDRLINK_FRESH"
+"""Set by `make fresh`."""
+
 
 def pytest_configure() -> None:
     """A shell's background job ignores SIGINT, and so would all processes that tests start."""
@@ -21,8 +24,15 @@ def pytest_configure() -> None:
     settings.load_profile("law")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark slow tests: a daemon takes a second to start, unless a test is marked as quick."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark slow tests: a daemon takes a second to start, unless a test is marked as quick.
+
+    Those for `make fresh` run only there.
+    """
+    later = [] if os.environ.get(FRESH) else [i for i in items if i.get_closest_marker("fresh")]
+    if later:
+        config.hook.pytest_deselected(items=later)
+        items[:] = [item for item in items if item not in later]
     for item in items:
         starts = "start_daemon" in getattr(item, "fixturenames", ())
         if starts and not item.get_closest_marker("quick"):

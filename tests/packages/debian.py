@@ -8,8 +8,6 @@ import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import pytest
-
 from tests.machine import ROOT as NEEDS_ROOT
 from tests.machine import lacks
 
@@ -18,7 +16,6 @@ SCRIPT = ROOT / "etc/minimal-debian.sh"
 EMULATE = ROOT / "etc/emulate-arm64.sh"
 BUILDER = ("ca-certificates", "gcc", "libc6-dev", "make", "python3-dev", "python3-venv")
 """What `make deb` needs on a minimal system; python3-dev where a library comes as source."""
-FRESH = "SDRLINK_FRESH"
 PATIENCE_S = 3600
 OF_APT = ("/var/lib/apt/", "/var/lib/dpkg/", "/var/cache/", "/var/log/", "/tmp/", "/dev/shm/")
 """What apt and dpkg keep for themselves, and files of the tests."""
@@ -29,14 +26,6 @@ def lacking():
     if missing := [name for name in ("mmdebstrap", "dpkg") if shutil.which(name) is None]:
         return lacks(*missing)
     return "" if os.geteuid() == 0 else NEEDS_ROOT
-
-
-def only_fresh():
-    """Skips a test that is too long for each run, unless `make fresh` asks for it."""
-    if not os.environ.get(FRESH):
-        pytest.skip(f"for `make fresh`: {FRESH}=1")
-    if why := lacking():
-        pytest.skip(why)
 
 
 def suite():

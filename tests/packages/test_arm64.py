@@ -7,15 +7,17 @@ import sys
 import pytest
 
 from tests.machine import lacks
-from tests.packages.debian import BUILDER, ROOT, Debian, call, only_fresh
+from tests.packages.debian import BUILDER, ROOT, Debian, call, lacking
 
 DEMO = "sdrlinkctl demo --engine numpy --link ofdm --duration 2 --speed 0.05 --rate 1e5"
 """Qemu is 10 to 20 times as slow as the machine, and so is NumPy beside the compiled modem."""
 
 
+@pytest.mark.fresh
 @pytest.mark.timeout(7200)
 def test_the_package_for_64_bit_arm_installs_and_delivers_every_message(tmp_path):
-    only_fresh()
+    if why := lacking():
+        pytest.skip(why)
     if shutil.which("qemu-aarch64-static") is None:
         pytest.skip(lacks("qemu-user-static"))
     # The host's compiler makes the modem; under qemu it would take as long as all the rest.

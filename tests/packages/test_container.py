@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from tests.machine import lacks
-from tests.packages.debian import BUILDER, ROOT, call, only_fresh
+from tests.packages.debian import BUILDER, ROOT, call
 
 CONTAINERFILE = ROOT / "Containerfile"
 BUILT = "COPY --from=build /src/dist/"
@@ -24,7 +24,6 @@ wait $!
 @pytest.fixture
 def buildah(tmp_path):
     """buildah with images of its own, as it works without a daemon and without networks."""
-    only_fresh()
     if shutil.which("buildah") is None:
         pytest.skip(lacks("buildah"))
     places = ("--root", tmp_path / "images", "--runroot", tmp_path / "run")
@@ -36,6 +35,7 @@ def buildah(tmp_path):
     run("rm", "--all")
 
 
+@pytest.mark.fresh
 def test_the_container_has_the_daemon_and_no_root(buildah, base, deb, tmp_path):
     empty = buildah("from", "scratch").strip()
     packed = tmp_path / "base.tar"

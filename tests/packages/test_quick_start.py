@@ -5,7 +5,8 @@ import shutil
 
 from docs.site.stage import ROOT
 from tests.docs.pages import commands_of, missing_words
-from tests.packages.debian import FRESH, call
+from tests.packages.debian import call
+from tests.tiers import FRESH
 
 LIBRARIES = "phy/engine/libraries"
 PREPARED = ("git", "make", "python3-venv")
