@@ -7,7 +7,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -23,7 +23,7 @@ from sdrlinkd.config import WITHOUT_AIR, Config, Setup, backend_of, located
 from sdrlinkd.control import Control
 from sdrlinkd.declaring import Declaring
 from sdrlinkd.descriptors import Descriptors
-from sdrlinkd.errors import ConfigError, UserError
+from sdrlinkd.errors import ConfigError, ungrouped
 from sdrlinkd.health import Level
 from sdrlinkd.keeping import open_keeping
 from sdrlinkd.link import Link
@@ -75,40 +75,26 @@ async def run(setup: Setup, reload: Reload, early: EarlyModem, descriptors: int)
         node, control, reloading, guard = await _open(setup, stack, reload, early, descriptors)
         loop.add_signal_handler(signal.SIGHUP, reloading.on_signal)
         stack.callback(signal.signal, signal.SIGHUP, signal.SIG_IGN)
-        async with _only_one_error(), asyncio.TaskGroup() as tasks:
-            running = [
-                tasks.create_task(node.carry(), name="carry"),
-                tasks.create_task(node.tick(), name="tick"),
-                tasks.create_task(_watch(notifier, node, control), name="watch"),
-                tasks.create_task(guard.watch(), name="descriptors"),
-            ]
-            # The bus accepts messages from here on; the radio may appear later.
-            notifier.ready()
-            await stop.wait()
-            log.info("stopping: %d messages queued", node.snapshot(0).link.tx.queued)
-            notifier.stopping()
-            notifier.extend(setup.config.drain_s + STOP_S)
-            await node.drain(setup.config.drain_s)
-            for task in running:
-                task.cancel()
+        with ungrouped():
+            async with asyncio.TaskGroup() as tasks:
+                running = [
+                    tasks.create_task(node.carry(), name="carry"),
+                    tasks.create_task(node.tick(), name="tick"),
+                    tasks.create_task(_watch(notifier, node, control), name="watch"),
+                    tasks.create_task(guard.watch(), name="descriptors"),
+                ]
+                # The bus accepts messages from here on; the radio may appear later.
+                notifier.ready()
+                await stop.wait()
+                log.info("stopping: %d messages queued", node.snapshot(0).link.tx.queued)
+                notifier.stopping()
+                notifier.extend(setup.config.drain_s + STOP_S)
+                await node.drain(setup.config.drain_s)
+                for task in running:
+                    task.cancel()
         for problem in node.audit():
             log.error("ledger: %s", problem)
         log.info("stopped: %s", traffic_line(node.snapshot(control.requests)))
-
-
-@contextlib.asynccontextmanager
-async def _only_one_error() -> AsyncIterator[None]:
-    """Unwrap a UserError from its exception group. Raises UserError."""
-    try:
-        yield
-    except BaseExceptionGroup as group:  # Python 3.11.2 regroups what `except*` raises.
-        mendable, rest = group.split(UserError)
-        if mendable is None or rest is not None:
-            raise
-        error: BaseException = mendable
-        while isinstance(error, BaseExceptionGroup):
-            error = error.exceptions[0]
-        raise error from None
 
 
 async def _open(

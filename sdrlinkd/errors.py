@@ -16,6 +16,9 @@
 Any other exception is a bug of ours. One such bug has a class of its own: IllegalStepError.
 """
 
+import contextlib
+from collections.abc import Iterator
+
 
 class SdrlinkError(Exception):
     """Base class of all errors that are not bugs."""
@@ -23,6 +26,21 @@ class SdrlinkError(Exception):
 
 class UserError(SdrlinkError):
     """Bad input from a person; the message names what was given and what is allowed."""
+
+
+@contextlib.contextmanager
+def ungrouped() -> Iterator[None]:
+    """Raises a UserError by itself that ended a task group, which wraps even a single error."""
+    try:
+        yield
+    except BaseExceptionGroup as group:
+        mistakes, others = group.split(UserError)
+        if mistakes is None or others is not None:
+            raise
+        error: BaseException = mistakes
+        while isinstance(error, BaseExceptionGroup):
+            error = error.exceptions[0]
+        raise error from None
 
 
 class ConfigError(UserError):

@@ -11,7 +11,7 @@ import msgspec
 from sdrlinkd.client import Message
 from sdrlinkd.config import Setup
 from sdrlinkd.daemon_side import DaemonSide
-from sdrlinkd.errors import UserError
+from sdrlinkd.errors import ungrouped
 from sdrlinkd.fleet.alarm import Alarm
 from sdrlinkd.fleet.commands import Order
 from sdrlinkd.fleet.downward import DownwardCommands
@@ -282,12 +282,7 @@ async def run_gateway(setup: Setup, folder: Path) -> None:
     """Run a gateway until cancelled; file names are relative to `folder`. Raises UserError."""
     session = await open_session(setup.config.fleet, folder)
     try:
-        await Gateway(setup, session).run()
-    except ExceptionGroup as group:
-        # A task group wraps even a single error.
-        mistakes, others = group.split(UserError)
-        if mistakes is None or others is not None:
-            raise
-        raise mistakes.exceptions[0] from None
+        with ungrouped():
+            await Gateway(setup, session).run()
     finally:
         await session.close()

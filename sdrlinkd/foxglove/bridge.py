@@ -10,7 +10,7 @@ from foxglove.websocket import StatusLevel
 
 from sdrlinkd.client import Message
 from sdrlinkd.daemon_side import DaemonSide
-from sdrlinkd.errors import UserError
+from sdrlinkd.errors import ungrouped
 from sdrlinkd.foxglove.channels import ReceivedTopics
 from sdrlinkd.foxglove.operators import Operators
 from sdrlinkd.foxglove.report import BridgeReport
@@ -93,11 +93,5 @@ async def run_bridge(
     """
     bridge = Bridge(directory, host, port, patterns)
     started(bridge.port)
-    try:
+    with ungrouped():
         await bridge.run(topics)
-    except ExceptionGroup as group:
-        # A task group wraps even a single error.
-        mistakes, others = group.split(UserError)
-        if mistakes is None or others is not None:
-            raise
-        raise mistakes.exceptions[0] from None

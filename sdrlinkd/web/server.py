@@ -12,7 +12,7 @@ import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
 
-from sdrlinkd.errors import UserError
+from sdrlinkd.errors import UserError, ungrouped
 from sdrlinkd.web.floor_plan import FloorPlan
 from sdrlinkd.web.guard import LOCAL_NAMES, Guard
 from sdrlinkd.web.page import build_page
@@ -71,12 +71,27 @@ async def serve(
     listening = _listen(options)
     server = uvicorn.Server(_config(options, world))
     tell(_address(options, listening.getsockname()[1]))
-    async with asyncio.TaskGroup() as group:
-        tasks = [group.create_task(feed()) for feed in feeds]
-        tasks.append(group.create_task(each_second(world)))
+    feeding = asyncio.ensure_future(_feed(world, feeds))
+
+    def end(_: object) -> None:
+        server.should_exit = True
+
+    feeding.add_done_callback(end)
+    try:
         await server.serve([listening])
-        for task in tasks:
-            task.cancel()
+    finally:
+        feeding.cancel()
+        await asyncio.wait([feeding])
+        if not feeding.cancelled():
+            with ungrouped():
+                feeding.result()
+
+
+async def _feed(world: World, feeds: list[Feed]) -> None:
+    async with asyncio.TaskGroup() as group:
+        group.create_task(each_second(world))
+        for feed in feeds:
+            group.create_task(feed())
 
 
 def _config(options: Options, world: World) -> uvicorn.Config:

@@ -100,6 +100,7 @@ def test_behind_a_proxy_its_name_counts(tmp_path):
         (("--floor-plan", "plan.yaml"), "plan.yaml: No such file"),
         (("--fleet", "a/b"), "--fleet: got"),
         (("--fleet", "a", "--connect", "base"), "--connect: got"),
+        (("--fleet", "a", "--zenoh", "absent.json5", "--listen", "127.0.0.1:0"), "fleet.zenoh: "),
     ],
 )  # fmt: skip
 def test_what_would_be_unsafe_or_cannot_be_is_refused(options, said, tmp_path):
