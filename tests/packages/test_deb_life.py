@@ -48,7 +48,7 @@ def test_a_removal_keeps_the_configuration_and_a_purge_leaves_nothing(debian, de
     enable(debian)
     debian.run(
         "sdrlinkctl phy info; sdrlinkctl plan; sdrlinkd --check;"
-        "touch /opt/sdrlinkd/lib/more.py /etc/sdrlinkd/keys.toml /etc/sdrlinkd/two.toml;"
+        "touch /opt/sdrlinkd/more.py /etc/sdrlinkd/keys.toml /etc/sdrlinkd/two.toml;"
         "mkdir -p /var/lib/sdrlinkd /var/lib/sdrlinkd-two /var/cache/sdrlinkd;"
         "chown sdrlink: /var/lib/sdrlinkd; touch /var/lib/sdrlinkd/state"
     )
