@@ -53,7 +53,7 @@ enter() {
     exec chroot --userspec="$1:$1" "$root" env -i HOME="$home" USER="$1" PATH=/usr/sbin:/usr/bin:/sbin:/bin \
         LANG=C.UTF-8 TERM=dumb COLUMNS=100 DEBIAN_FRONTEND=noninteractive SDRLINK_APT="$apt" \
         ${http_proxy:+http_proxy="$http_proxy"} ${https_proxy:+https_proxy="$https_proxy"} \
-        sh -e -c "cd; $2"
+        sh -e -c "cd 2>/dev/null || cd /; $2"
 }
 
 case $action in
