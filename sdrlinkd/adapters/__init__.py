@@ -6,6 +6,7 @@ from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.fields import cdr_from_fields
 from sdrlinkd.adapters.message_types import MessageTypes
 from sdrlinkd.adapters.pacing import first_seconds, from_second, paced
+from sdrlinkd.adapters.places import PLACES, SHARED_FRAMES, Fix, Place, read_place
 from sdrlinkd.adapters.recorder import BagWriter, Recorded
 from sdrlinkd.adapters.robot import BuiltInRobot
 from sdrlinkd.adapters.summary import BagSummary, TopicSummary, summarise
@@ -13,6 +14,8 @@ from sdrlinkd.adapters.transforms import Transforms
 from sdrlinkd.adapters.typestore import definition, empty, from_cdr, knows, to_cdr
 
 __all__ = [
+    "PLACES",
+    "SHARED_FRAMES",
     "Bag",
     "BagMessage",
     "BagSummary",
@@ -21,7 +24,9 @@ __all__ = [
     "BuiltInRobot",
     "ChronySocket",
     "Due",
+    "Fix",
     "MessageTypes",
+    "Place",
     "Recorded",
     "TopicSummary",
     "Transforms",
@@ -35,6 +40,7 @@ __all__ = [
     "knows",
     "open_bag",
     "paced",
+    "read_place",
     "summarise",
     "to_cdr",
 ]
