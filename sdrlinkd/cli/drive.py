@@ -15,7 +15,7 @@ NO_PLOTS = "the report needs matplotlib and Jinja2: pip install 'sdrlinkd[plots]
 NO_DAEMON = (
     "log: no daemon of this host is running; start one, or name its directory with --runtime-dir"
 )
-REPORT = "report.html"
+PAGE = "report.html"
 
 
 @app.command("log")
@@ -58,6 +58,14 @@ def report(
     title: Annotated[str, typer.Option(help="Title of the page.")] = "",
 ) -> None:
     """Make one HTML page of a drive: map, delivery, latency, drops, events, what to change."""
+    folder = drive if drive.is_dir() else drive.parent
+    path = out or folder / PAGE
+    write_page(drive, title or f"Drive {folder.resolve().name}", path)
+    typer.echo(f"wrote {path}")
+
+
+def write_page(drive: Path, title: str, path: Path | None = None) -> None:
+    """Write the page of a drive, by default beside it. Raises UserError."""
     try:
         from sdrlinkd.drive import report_page
     except ModuleNotFoundError as error:
@@ -65,10 +73,8 @@ def report(
             raise
         raise UserError(NO_PLOTS) from None
     found = read_drive(drive)
-    path = out or found.path.parent / REPORT
-    text = report_page(found, title or f"Drive {found.path.parent.resolve().name}")
+    path = path or found.path.parent / PAGE
     try:
-        path.write_text(text)
+        path.write_text(report_page(found, title))
     except OSError as error:
-        raise UserError(f"--out {path}: {error.strerror}") from None
-    typer.echo(f"wrote {path}")
+        raise UserError(f"{path}: {error.strerror}") from None

@@ -5,8 +5,8 @@ The page needs matplotlib and Jinja2, which are extras: it is loaded on first us
 
 from typing import TYPE_CHECKING
 
-from sdrlinkd.drive.keeping import keep
-from sdrlinkd.drive.names import Event, received, sent
+from sdrlinkd.drive.keeping import Chronicle, keep
+from sdrlinkd.drive.names import DRIVE, Event, received, sent
 from sdrlinkd.drive.reading import Drive, read_drive
 from sdrlinkd.drive.writer import DriveWriter
 
@@ -14,8 +14,17 @@ if TYPE_CHECKING:
     from sdrlinkd.drive.page import report_page
 
 __all__ = [
-    "Drive", "DriveWriter", "Event", "keep", "read_drive", "received", "report_page", "sent",
-]  # fmt: skip
+    "DRIVE",
+    "Chronicle",
+    "Drive",
+    "DriveWriter",
+    "Event",
+    "keep",
+    "read_drive",
+    "received",
+    "report_page",
+    "sent",
+]
 
 
 def __getattr__(name: str) -> object:

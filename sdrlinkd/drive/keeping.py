@@ -18,50 +18,64 @@ STATUS_NS = 900_000_000
 """Least time in ns between two reports of a daemon that are kept."""
 
 
-class Kept:
+class Chronicle:
+    """Writes what one daemon reports, and in sentences what changes."""
+
+    def __init__(self, writer: DriveWriter) -> None:
+        self._writer = writer
+        self._health = Health()
+        self.robot: int | None = None
+        """Id of the daemon's robot; None before its first report."""
+        self._status_at = 0
+        self._level = ""
+
+    def see(self, snapshot: Snapshot | None, now_ns: int) -> None:
+        """Take a report, or None while the daemon is away."""
+        if snapshot is None:
+            if self._level:
+                self._say("error", "the daemon does not answer", now_ns)
+                self._level = ""
+            return
+        if now_ns < self._status_at + STATUS_NS:
+            return
+        self.robot, self._status_at = snapshot.node, now_ns
+        self._writer.status(snapshot, now_ns)
+        verdict = snapshot.verdict
+        if verdict.level != self._level:
+            level = "info" if verdict.level == "OK" else "warning"
+            self._say(level, ": ".join([verdict.level, *verdict.reasons[:1]]), now_ns)
+            self._level = verdict.level
+        for line in self._health.look(snapshot):
+            self._say(line.level.value, line.text, now_ns)
+
+    def _say(self, level: str, text: str, now_ns: int) -> None:
+        if self.robot is not None:
+            self._writer.event(Event(self.robot, level, text), now_ns)
+
+
+class _Kept:
     """What one daemon says, on its way into the file."""
 
     def __init__(self, directory: Path, writer: DriveWriter, patterns: Sequence[str]) -> None:
         self._writer = writer
         self._patterns = patterns
-        self._health = Health()
-        self._robot: int | None = None
-        self._status_at = 0
-        self._level = ""
-        self.watch = DaemonWatch(directory, self._see, self._take, self._wants)
+        self._chronicle = Chronicle(writer)
+        self.watch = DaemonWatch(
+            directory,
+            lambda snapshot: self._chronicle.see(snapshot, time.time_ns()),
+            self._take,
+            self._wants,
+        )
 
     def _wants(self, topic: str, kind: str) -> bool:
         return kind in PLACES or any(fnmatch.fnmatchcase(topic, each) for each in self._patterns)
 
-    def _see(self, snapshot: Snapshot | None) -> None:
-        now = time.time_ns()
-        if snapshot is None:
-            if self._level and self._robot is not None:
-                self._say(self._robot, "error", "the daemon does not answer", now)
-                self._level = ""
-            return
-        if now < self._status_at + STATUS_NS:
-            return
-        self._robot, self._status_at = snapshot.node, now
-        self._writer.status(snapshot, now)
-        verdict = snapshot.verdict
-        if verdict.level != self._level:
-            level = "info" if verdict.level == "OK" else "warning"
-            self._say(snapshot.node, level, ": ".join([verdict.level, *verdict.reasons[:1]]), now)
-            self._level = verdict.level
-        for line in self._health.look(snapshot):
-            self._say(snapshot.node, line.level.value, line.text, now)
-
-    def _say(self, robot: int, level: str, text: str, now: int) -> None:
-        self._writer.event(Event(robot, level, text), now)
-
     def _take(self, source: Source, cdr: bytes) -> None:
-        if self._robot is None:
-            return
-        topic = sent(source.robot, source.topic)
-        if not source.is_sent:
-            topic = received(self._robot, source.robot, source.topic)
-        self._writer.message(topic, source.kind, cdr, time.time_ns())
+        at = self._chronicle.robot
+        if at is not None:
+            is_sent, robot, topic = source.is_sent, source.robot, source.topic
+            name = sent(robot, topic) if is_sent else received(at, robot, topic)
+            self._writer.message(name, source.kind, cdr, time.time_ns())
 
 
 async def keep(
@@ -75,7 +89,7 @@ async def keep(
     """
     async with asyncio.TaskGroup() as group:
         for each in directories:
-            group.create_task(Kept(each, writer, patterns).watch.run())
+            group.create_task(_Kept(each, writer, patterns).watch.run())
         while True:
             await asyncio.sleep(SYNC_S)
             writer.sync()

@@ -72,7 +72,8 @@ def over_time(drive: Drive, station: Station) -> bytes | None:
 def _draw(panel: Axes, station: Station, name: str) -> None:
     title, unit = TITLES[name]
     lines = station.lines[name]
-    chosen = sorted(lines, key=lambda each: -_largest(lines[each]))[:MOST_LINES]
+    known = [each for each in lines if any(value is not None for value in lines[each])]
+    chosen = sorted(known, key=lambda each: -_largest(lines[each]))[:MOST_LINES]
     styles = looks(sorted(chosen))
     for line in sorted(chosen):
         look = styles[line]

@@ -13,7 +13,7 @@ from sdrlinkd.web.positions import position_in
 from sdrlinkd.web.track import MOST_POINTS
 from sdrlinkd.web.world import World
 from tests.laws import law
-from tests.web.snapshots import neighbor, snapshot
+from tests.reported import neighbor, snapshot
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 FIX = "sensor_msgs/msg/NavSatFix"
