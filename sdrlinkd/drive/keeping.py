@@ -27,6 +27,7 @@ class Chronicle:
         self.robot: int | None = None
         """Id of the daemon's robot; None before its first report."""
         self._status_at = 0
+        self._last: tuple[Snapshot, int] | None = None
         self._level = ""
 
     def see(self, snapshot: Snapshot | None, now_ns: int) -> None:
@@ -37,7 +38,9 @@ class Chronicle:
                 self._level = ""
             return
         if now_ns < self._status_at + STATUS_NS:
+            self._last = snapshot, now_ns
             return
+        self._last = None
         self.robot, self._status_at = snapshot.node, now_ns
         self._writer.status(snapshot, now_ns)
         verdict = snapshot.verdict
@@ -47,6 +50,12 @@ class Chronicle:
             self._level = verdict.level
         for line in self._health.look(snapshot):
             self._say(line.level.value, line.text, now_ns)
+
+    def end(self) -> None:
+        """Write the last report, if it came too soon after the one before."""
+        if self._last is not None:
+            self._writer.status(*self._last)
+            self._last = None
 
     def _say(self, level: str, text: str, now_ns: int) -> None:
         if self.robot is not None:
@@ -59,10 +68,10 @@ class _Kept:
     def __init__(self, directory: Path, writer: DriveWriter, patterns: Sequence[str]) -> None:
         self._writer = writer
         self._patterns = patterns
-        self._chronicle = Chronicle(writer)
+        self.chronicle = Chronicle(writer)
         self.watch = DaemonWatch(
             directory,
-            lambda snapshot: self._chronicle.see(snapshot, time.time_ns()),
+            lambda snapshot: self.chronicle.see(snapshot, time.time_ns()),
             self._take,
             self._wants,
         )
@@ -71,7 +80,7 @@ class _Kept:
         return kind in PLACES or any(fnmatch.fnmatchcase(topic, each) for each in self._patterns)
 
     def _take(self, source: Source, cdr: bytes) -> None:
-        at = self._chronicle.robot
+        at = self.chronicle.robot
         if at is not None:
             is_sent, robot, topic = source.is_sent, source.robot, source.topic
             name = sent(robot, topic) if is_sent else received(at, robot, topic)
@@ -87,10 +96,15 @@ async def keep(
     That are their reports once a second, events, the messages that say where robots are, and those
     of topics that match a pattern. `progress` is called once a second.
     """
-    async with asyncio.TaskGroup() as group:
-        for each in directories:
-            group.create_task(_Kept(each, writer, patterns).watch.run())
-        while True:
-            await asyncio.sleep(SYNC_S)
-            writer.sync()
-            progress()
+    kept = [_Kept(each, writer, patterns) for each in directories]
+    try:
+        async with asyncio.TaskGroup() as group:
+            for each in kept:
+                group.create_task(each.watch.run())
+            while True:
+                await asyncio.sleep(SYNC_S)
+                writer.sync()
+                progress()
+    finally:
+        for each in kept:
+            each.chronicle.end()

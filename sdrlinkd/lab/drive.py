@@ -45,6 +45,8 @@ class RunDrive:
 
     def close(self) -> None:
         """Close the file."""
+        for each in self._chronicles.values():
+            each.end()
         self._writer.close()
 
     def _ns(self, at_s: float) -> int:

@@ -117,6 +117,17 @@ def test_what_changes_is_told_once(tmp_path):
     assert texts.count("the daemon does not answer") == 1
 
 
+def test_reports_are_a_second_apart_and_the_last_one_is_kept(tmp_path):
+    writer = DriveWriter(tmp_path)
+    chronicle = Chronicle(writer)
+    for tenth in range(26):
+        chronicle.see(report(tenth, uptime_s=tenth / 10), BEGIN_NS + tenth * SECOND_NS // 10)
+    chronicle.end()
+    chronicle.end()
+    writer.close()
+    assert read_drive(tmp_path).stations[1].times == [0.0, 0.9, 1.8, 2.5]
+
+
 def test_it_can_be_read_up_to_the_last_sync_whatever_happens_then(tmp_path):
     writer = DriveWriter(tmp_path)
     for second in range(20):
