@@ -3,6 +3,7 @@
 The module needs matplotlib, which is an extra and slow to load.
 """
 
+import io
 from collections.abc import Iterable, Iterator
 from itertools import cycle
 from pathlib import Path
@@ -87,6 +88,14 @@ def save(figure: Figure, path: Path, caption: str) -> None:
     # Without the version of the library, one picture has one content.
     figure.savefig(path, dpi=DPI, bbox_inches="tight", metadata={"Software": None})
     plt.close(figure)
+
+
+def png_of(figure: Figure) -> bytes:
+    """The picture as PNG."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, dpi=DPI, bbox_inches="tight", metadata={"Software": None})
+    plt.close(figure)
+    return drawn.getvalue()
 
 
 def _others() -> Iterator[Look]:

@@ -1,4 +1,4 @@
-"""Makes docs/screens/web-*.png: the page of `sdrlinkctl web` beside a running lab.
+"""Makes the pictures in docs/screens: the page of `sdrlinkctl web`, and a drive's report.
 
 `make figures` runs it. It needs Chromium and ChromeDriver.
 """
@@ -15,6 +15,7 @@ from sdrlinkd.process import Process, module
 
 SCREENS = Path(__file__).parents[1] / "screens"
 SIZE = (1180, 740)
+REPORT_SIZE = (900, 2100)
 WATCHED_S = 70
 VIEWS = {
     "mine": {"map": "Map"},
@@ -25,10 +26,26 @@ VIEWS = {
 
 def main() -> int:
     """Make all of them."""
+    _report()
     for scenario, views in VIEWS.items():
         with tempfile.TemporaryDirectory() as folder:
             _look(scenario, views, Path(folder))
     return 0
+
+
+def _report() -> None:
+    """The page of the scenario mine, in lock-step."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with Process(module("sdrlinkd.cli", "lab", "mine", "--out", folder / "out")) as lab:
+            lab.wait(600)
+        browser = Browser(folder / "profile", size=REPORT_SIZE)
+        try:
+            browser.open((folder / "out/report.html").as_uri())
+            browser.picture(SCREENS / "report-mine.png")
+        finally:
+            browser.close()
+    sys.stdout.write("wrote report-mine.png\n")
 
 
 def _look(scenario: str, views: dict[str, str], folder: Path) -> None:

@@ -4,15 +4,19 @@ from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
 from sdrlinkd.adapters.chrony import ChronySocket
 from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.fields import cdr_from_fields
+from sdrlinkd.adapters.mcap_file import McapFile, Recorded
 from sdrlinkd.adapters.message_types import MessageTypes
 from sdrlinkd.adapters.pacing import first_seconds, from_second, paced
-from sdrlinkd.adapters.recorder import BagWriter, Recorded
+from sdrlinkd.adapters.places import PLACES, SHARED_FRAMES, Fix, Place, read_place
+from sdrlinkd.adapters.recorder import BagWriter
 from sdrlinkd.adapters.robot import BuiltInRobot
 from sdrlinkd.adapters.summary import BagSummary, TopicSummary, summarise
 from sdrlinkd.adapters.transforms import Transforms
 from sdrlinkd.adapters.typestore import definition, empty, from_cdr, knows, to_cdr
 
 __all__ = [
+    "PLACES",
+    "SHARED_FRAMES",
     "Bag",
     "BagMessage",
     "BagSummary",
@@ -21,7 +25,10 @@ __all__ = [
     "BuiltInRobot",
     "ChronySocket",
     "Due",
+    "Fix",
+    "McapFile",
     "MessageTypes",
+    "Place",
     "Recorded",
     "TopicSummary",
     "Transforms",
@@ -35,6 +42,7 @@ __all__ = [
     "knows",
     "open_bag",
     "paced",
+    "read_place",
     "summarise",
     "to_cdr",
 ]

@@ -1,34 +1,19 @@
 """Writes bags: rosbag2 folders of MCAP files that are whole at every moment, even after a crash."""
 
-import os
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from mcap.opcode import Opcode
-from mcap.writer import CompressionType, Writer
 from ruamel.yaml import YAML
 
-from sdrlinkd.adapters.typestore import definition
+from sdrlinkd.adapters.mcap_file import McapFile, Recorded, qos
 from sdrlinkd.errors import BagError
 
 METADATA = "metadata.yaml"
 VERSION = 5
 """Version of metadata.yaml that Humble and later write or read."""
-CHUNK_BYTES = 1 << 20
 SECOND_NS = 1_000_000_000
-
-
-class Recorded(NamedTuple):
-    """A message to be recorded; times in ns since 1970."""
-
-    topic: str
-    type: str
-    cdr: bytes
-    received_ns: int
-    published_ns: int
-    is_latched: bool = False
 
 
 @dataclass
@@ -106,9 +91,9 @@ class BagWriter:
         is_large = 0 < self._max_bytes <= self._file.n_bytes
         return totals.n_messages > 0 and (is_long or is_large)
 
-    def _next_file(self) -> "_File":
+    def _next_file(self) -> McapFile:
         self._of_file.append(_Totals())
-        return _File(self._folder / self._name(len(self._of_file) - 1))
+        return McapFile(self._folder / self._name(len(self._of_file) - 1))
 
     def _name(self, number: int) -> str:
         return f"{self._folder.name}_{number}.mcap"
@@ -145,103 +130,6 @@ class BagWriter:
         with written.open("w") as file:
             YAML().dump({"rosbag2_bagfile_information": information}, file)
         written.replace(self._folder / METADATA)
-
-
-class _File:
-    """One MCAP file."""
-
-    def __init__(self, path: Path) -> None:
-        self._stream = _WholeStream(path)
-        self._writer = _writer(self._stream)
-        self._writer.start("ros2", "sdrlinkd")
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[tuple[str, str, bool], int] = {}
-        self._added = 0
-        self.sync()
-
-    @property
-    def n_bytes(self) -> int:
-        """Bytes so far, about."""
-        return self._stream.tell() + self._added
-
-    def add(self, message: Recorded) -> None:
-        key = message.topic, message.type, message.is_latched
-        channel = self._channels.get(key)
-        if channel is None:
-            channel = self._channels[key] = self._writer.register_channel(
-                message.topic, "cdr", self._schema(message.type),
-                {"offered_qos_profiles": qos(message.is_latched)},
-            )  # fmt: skip
-        self._writer.add_message(channel, message.received_ns, message.cdr, message.published_ns)
-        self._added += len(message.cdr)
-
-    def sync(self) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._stream.sync()
-        self._added = 0
-
-    def close(self) -> None:
-        self._stream.close()
-
-    def _schema(self, type_: str) -> int:
-        if type_ not in self._schemas:
-            text = definition(type_)
-            self._schemas[type_] = self._writer.register_schema(
-                type_, "ros2msg" if text else "", text.encode()
-            )
-        return self._schemas[type_]
-
-
-def _writer(stream: Any) -> Writer:  # noqa: ANN401
-    # Summary offsets, which are optional, would pile up with each `finish`.
-    return Writer(stream, CHUNK_BYTES, compression=CompressionType.NONE, use_summary_offsets=False)
-
-
-class _WholeStream:
-    """A stream of which each `sync` writes all that is new, and the file's end, in one call.
-
-    The next `sync` writes over that end, which a kill of this process cannot interrupt.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
-        self._base = 0
-        self._new = bytearray()
-        self._end_at: int | None = None
-
-    def tell(self) -> int:
-        return self._base + len(self._new)
-
-    def write(self, data: bytes) -> int:
-        if data[:1] == bytes((Opcode.DATA_END,)) and len(data) == 13:
-            self._end_at = len(self._new)
-        self._new += data
-        return len(data)
-
-    def flush(self) -> None:
-        """Do nothing: `sync` writes."""
-
-    def sync(self) -> None:
-        os.pwrite(self._fd, self._new, self._base)
-        if self._end_at is not None:
-            self._base += self._end_at
-        self._new.clear()
-        self._end_at = None
-
-    def close(self) -> None:
-        os.close(self._fd)
-
-
-def qos(is_latched: bool) -> str:
-    """The QoS of a topic in the words of rosbag2."""
-    durability = 1 if is_latched else 2
-    forever = "\n    sec: 9223372036\n    nsec: 854775807"
-    return (
-        "- history: 1\n  depth: 10\n  reliability: 1\n"
-        f"  durability: {durability}\n  deadline:{forever}\n  lifespan:{forever}\n"
-        f"  liveliness: 1\n  liveliness_lease_duration:{forever}\n"
-        "  avoid_ros_namespace_conventions: false"
-    )
 
 
 def _span(totals: _Totals) -> dict[str, Any]:

@@ -45,6 +45,13 @@ COMMANDS = {
         "Serve the figures of this host's daemons to Prometheus until Ctrl-C.", ("exporter",)
     ),
     "bridge": Listed("Show the link and what it carries in other programs.", ("bridge",)),
+    "log": Listed(
+        "Keep reports, events and messages of daemons in one file until Ctrl-C.", ("drive",)
+    ),
+    "report": Listed(
+        "Make one HTML page of a drive: map, delivery, latency, drops, events, what to change.",
+        ("drive",),
+    ),
     "check": Listed(
         "Verify the running daemon's ledger; exit code 1 when it does not add up.", ("status",)
     ),

@@ -13,13 +13,16 @@ from rich.text import Text
 
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.compiling import compile_first
+from sdrlinkd.cli.drive import PAGE, write_page
 from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
 from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario, scenario_names
 from sdrlinkd.cli.page_beside import page_beside
+from sdrlinkd.drive import DRIVE
 from sdrlinkd.lab import (
     LabOptions,
     LabReport,
     LabState,
+    RunDrive,
     find_scenario,
     live_table,
     pair_table,
@@ -71,7 +74,7 @@ def lab(
     web: Annotated[
         bool, typer.Option("--web", help="Serve the page of the daemons while they run.")
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder for report.json and lab.png.")] = Path(
+    out: Annotated[Path, typer.Option(help="Folder for reports, lab.png and the drive.")] = Path(
         "build/lab"
     ),
 ) -> None:
@@ -100,8 +103,11 @@ def lab(
         else:
             console.print(starting, highlight=False)
         told: list[str] = []
+        kept = RunDrive(out, time.time_ns())
+        stack.callback(kept.close)
 
         def watch(state: LabState) -> None:
+            kept.see(state.snapshots, state.now_s)
             if state.snapshots and not told:
                 # Only once the daemons answer.
                 told.extend(each.bus.runtime_dir for each in state.snapshots)
@@ -114,14 +120,15 @@ def lab(
             if console.is_terminal:
                 live.update(live_table(title, state), refresh=True)
 
-        report = run_lab(options, watch)
+        report = run_lab(options, watch, kept.places)
     write_report(out / REPORT, report)
     wall_s = time.monotonic() - began
     pictures.draw(report, chosen, out / PICTURE, _caption(report, scenario))
     console.print(pair_table(report))
     for line in _summary(report, wall_s):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    wrote = f"wrote {out}/{REPORT}, {PICTURE}"
+    write_page(out, title)
+    wrote = f"wrote {out}/{REPORT}, {PICTURE}, {DRIVE}, {PAGE}"
     console.print(wrote, highlight=False, markup=False, soft_wrap=True)
     if not all(robot.ledger_adds_up for robot in report.robots):
         raise typer.Exit(1)

@@ -5,18 +5,13 @@ This package speaks to the daemon over the bus and the control socket only. It n
 
 from sdrlinkd.foxglove.bridge import run_bridge
 from sdrlinkd.foxglove.commands import Command, judge
-from sdrlinkd.foxglove.places import SHARED_FRAMES, Fix, Place, read_place
 from sdrlinkd.foxglove.report import BridgeReport
-from sdrlinkd.foxglove.schema import json_schema
+from sdrlinkd.json_schema import json_schema
 
 __all__ = [
-    "SHARED_FRAMES",
     "BridgeReport",
     "Command",
-    "Fix",
-    "Place",
     "json_schema",
     "judge",
-    "read_place",
     "run_bridge",
 ]

@@ -15,8 +15,8 @@ from sdrlinkd.foxglove.channels import ReceivedTopics
 from sdrlinkd.foxglove.operators import Operators
 from sdrlinkd.foxglove.report import BridgeReport
 from sdrlinkd.foxglove.scene import Scene
-from sdrlinkd.foxglove.schema import json_schema
 from sdrlinkd.foxglove.server import SlowClients, start_server
+from sdrlinkd.json_schema import json_schema
 from sdrlinkd.reports import Snapshot
 
 STATUS, BRIDGE = "/sdrlink/status", "/sdrlink/bridge"

@@ -19,9 +19,9 @@ from foxglove.messages import (
     Vector3,
 )
 
+from sdrlinkd.adapters import Fix, Place, read_place
 from sdrlinkd.client import Message
 from sdrlinkd.errors import CdrError
-from sdrlinkd.foxglove.places import Fix, Place, read_place
 
 ROBOTS, FRAMES = "/sdrlink/robots", "/sdrlink/frames"
 WORLD = "map"

@@ -30,6 +30,7 @@ PICTURES = {
     "wait": Picture("Wait in the queue", "ms"),
     "drops": Picture("Messages dropped", "/s"),
     "clock": Picture("Error of clocks at most", "µs"),
+    "age": Picture("Age of messages, p99", "ms"),
 }
 
 

@@ -1,15 +1,14 @@
-"""Where a robot is, by the message that says so."""
+"""Where a robot is drawn, by the message that says where it is."""
 
-from collections.abc import Callable
-from math import atan2, cos, isfinite, radians
-from typing import Any, NamedTuple
+from math import atan2, cos, radians
+from typing import NamedTuple
 
-from sdrlinkd.adapters import from_cdr
+from sdrlinkd.adapters import PLACES, Place, read_place
 from sdrlinkd.errors import CdrError
 
 EARTH_M = 6_371_008.8
 """Mean radius of the earth."""
-NO_FIX = -1
+PREFERENCE = {kind: rank for rank, kind in enumerate(PLACES)}
 
 
 class Position(NamedTuple):
@@ -24,41 +23,22 @@ class Position(NamedTuple):
     is_geographic: bool = False
 
 
-def position_in(cdr: bytes, kind: str) -> Position | None:
-    """The position in a message of a type in POSITIONS; None if it has none that is finite."""
+def position_in(robot: int, cdr: bytes, kind: str) -> Position | None:
+    """The position in a message of a robot, of a type in PREFERENCE; None if it has none."""
     try:
-        found = POSITIONS[kind](from_cdr(cdr, kind))
+        found = read_place(robot, kind, cdr)
     except CdrError:
         return None
-    return found if found and isfinite(found.x) and isfinite(found.y) else None
+    if found is None:
+        return None
+    if isinstance(found, Place):
+        x, y, z, w = found.turn
+        heading = atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return Position(found.position[0], found.position[1], heading)
+    return Position(found.longitude, found.latitude, is_geographic=True)
 
 
 def metres_from(origin: Position, there: Position) -> Position:
     """A geographic position in m from `origin`, for distances of some kilometres."""
     east = radians(there.x - origin.x) * EARTH_M * cos(radians(origin.y))
     return Position(east, radians(there.y - origin.y) * EARTH_M, there.heading)
-
-
-def _pose(pose: Any) -> Position:  # noqa: ANN401
-    at, turn = pose.position, pose.orientation
-    sine = 2 * (turn.w * turn.z + turn.x * turn.y)
-    cosine = 1 - 2 * (turn.y * turn.y + turn.z * turn.z)
-    heading = atan2(sine, cosine)
-    return Position(at.x, at.y, heading if isfinite(heading) else None)
-
-
-def _fix(message: Any) -> Position | None:  # noqa: ANN401
-    if message.status.status == NO_FIX:
-        return None
-    return Position(message.longitude, message.latitude, is_geographic=True)
-
-
-POSITIONS: dict[str, Callable[[Any], Position | None]] = {
-    "nav_msgs/msg/Odometry": lambda message: _pose(message.pose.pose),
-    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda message: _pose(message.pose.pose),
-    "geometry_msgs/msg/PoseWithCovariance": lambda message: _pose(message.pose),
-    "geometry_msgs/msg/PoseStamped": lambda message: _pose(message.pose),
-    "sensor_msgs/msg/NavSatFix": _fix,
-}
-"""The types of messages that say where a robot is, those that are preferred first."""
-PREFERENCE = {kind: rank for rank, kind in enumerate(POSITIONS)}

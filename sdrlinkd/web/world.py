@@ -84,7 +84,7 @@ class World:
         """Take a message of a robot, as `stations` received it; none: as the robot published it."""
         if kind not in PREFERENCE:
             return
-        found = position_in(cdr, kind)
+        found = position_in(robot, cdr, kind)
         if found is None:
             return
         tracks = [self._track(station, robot) for station in stations]

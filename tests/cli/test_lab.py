@@ -9,6 +9,7 @@ import pytest
 from backends import HubWatch
 from sdrlinkd.cli import run
 from sdrlinkd.cli.pace import scenario_names
+from sdrlinkd.drive import read_drive
 from sdrlinkd.lab import LabReport, find_scenario
 from sdrlinkd.lab import run as run_module
 from tests.conftest import ETC
@@ -103,7 +104,11 @@ def test_a_run_is_told_drawn_and_written(lab, tmp_path, monkeypatch):
     assert "Two small robots: delivery by pair" in out
     assert "PDR 0.8000 in all, 0.8000 at worst; in lock-step" in out
     assert "robot 2: tdma: 2 slots" in out
-    assert "out/report.json, lab.png" in out
+    assert "out/report.json, lab.png, drive.mcap, report.html" in out
+    drive = read_drive(tmp_path / "out")
+    assert set(drive.stations) == {1, 2}
+    assert drive.lasted_s == pytest.approx(2.0, abs=1.0)
+    assert drive.pdr(2, 1, "/cmd_vel") == pytest.approx(0.8)
 
 
 def test_options_go_before_the_scenario(lab, asked, tmp_path):

@@ -7,10 +7,10 @@ import sys
 import pytest
 
 from docs.site import foxglove_layout
-from sdrlinkd.adapters import cdr_from_fields
+from sdrlinkd.adapters import Fix, Place, cdr_from_fields, read_place
 from sdrlinkd.cli import run
 from sdrlinkd.cli.bridge import _meanings
-from sdrlinkd.foxglove import BridgeReport, Fix, Place, json_schema, judge, read_place
+from sdrlinkd.foxglove import BridgeReport, json_schema, judge
 from sdrlinkd.reports import Snapshot
 
 ODOMETRY, STAMPED = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"

@@ -3,7 +3,7 @@
 from sdrlinkd.reports import ClockReport
 from sdrlinkd.web.charts import PICTURES, empty_chart, empty_waterfall, series, waterfall
 from sdrlinkd.web.history import KEPT_S, MOST_LINES, History
-from tests.web.snapshots import neighbor, snapshot, topic
+from tests.reported import neighbor, snapshot, topic
 
 
 def lines(history, picture):

@@ -13,8 +13,8 @@ from sdrlinkd.reports import (
     VerdictReport,
 )
 from tests.programs import sdrlinkctl
+from tests.reported import neighbor, snapshot, topic
 from tests.web.conftest import page_of
-from tests.web.snapshots import neighbor, snapshot, topic
 from tests.web.test_map import ODOMETRY, odometry
 
 pytestmark = pytest.mark.slow

@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.adapters import empty, to_cdr
+from sdrlinkd.adapters import PLACES, empty, to_cdr
 from sdrlinkd.reports import FlowReport, RobotLinksReport, RoutesReport
 from sdrlinkd.web.map_data import map_paths, map_view
-from sdrlinkd.web.positions import POSITIONS, position_in
+from sdrlinkd.web.positions import position_in
 from sdrlinkd.web.track import MOST_POINTS
 from sdrlinkd.web.world import World
 from tests.laws import law
-from tests.web.snapshots import neighbor, snapshot
+from tests.reported import neighbor, snapshot
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 FIX = "sensor_msgs/msg/NavSatFix"
@@ -45,22 +45,22 @@ def at(world, node):
 
 
 def test_all_types_with_a_position_are_read():
-    for kind in POSITIONS:
-        assert position_in(to_cdr(empty(kind), kind), kind) is not None, kind
-    found = position_in(odometry(3.0, -4.0, pi / 3), ODOMETRY)
+    for kind in PLACES:
+        assert position_in(2, to_cdr(empty(kind), kind), kind) is not None, kind
+    found = position_in(2, odometry(3.0, -4.0, pi / 3), ODOMETRY)
     assert (found.x, found.y, found.heading) == pytest.approx((3.0, -4.0, pi / 3))
 
 
 @pytest.mark.parametrize("cdr", [odometry(nan, 0), odometry(0, inf), b"", b"\0\1\0\0abc"])
 def test_what_is_no_position_is_none(cdr):
-    assert position_in(cdr, ODOMETRY) is None
-    assert position_in(fix(1, 2, status=-1), FIX) is None
+    assert position_in(2, cdr, ODOMETRY) is None
+    assert position_in(2, fix(1, 2, status=-1), FIX) is None
 
 
 @law(200)
-@given(st.binary(max_size=900), st.sampled_from(sorted(POSITIONS)))
+@given(st.binary(max_size=900), st.sampled_from(sorted(PLACES)))
 def test_any_octets_are_a_position_or_none(octets, kind):
-    position_in(octets, kind)
+    position_in(2, octets, kind)
 
 
 def test_degrees_become_metres_from_the_first_fix():

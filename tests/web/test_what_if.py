@@ -12,7 +12,7 @@ from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.link import TopicPolicy
 from sdrlinkd.plan import Load
 from sdrlinkd.web.what_if import Choice, foresee, loads_of, policy_of, traffic_of
-from tests.web.snapshots import snapshot, topic
+from tests.reported import snapshot, topic
 
 LOADS = [Load(1, "odom", 50.0, 700.0, 700.0), Load(2, "scan", 10.0, 4000.0, 4000.0)]
 POLICIES = {1: {"qos": "urgent"}, 2: {"qos": "bulk", "lifespan_s": "inf"}}

@@ -1,10 +1,10 @@
-"""Where robots are, read from the messages that they send: no I/O, no Foxglove."""
+"""Where robots are, read from the messages that they send."""
 
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from sdrlinkd.adapters import from_cdr
+from sdrlinkd.adapters.typestore import from_cdr
 
 SHARED_FRAMES = ("map", "earth", "world")
 """Frames that all robots of a team mean alike; any other one is a robot's own."""
@@ -48,20 +48,20 @@ def read_place(robot: int, kind: str, cdr: bytes) -> Place | Fix | None:
     return None if reader is None else reader(robot, from_cdr(cdr, kind))
 
 
-def _frame(robot: int, header: Any) -> str:  # noqa: ANN401
+def _frame(robot: int, name: str) -> str:
     """A frame by a name that is one robot's alone, unless it is shared."""
-    name: str = header.frame_id.lstrip("/")[:MOST_FRAME]
+    name = name.lstrip("/")[:MOST_FRAME]
     own = f"robot_{robot}/"
     return name if name in SHARED_FRAMES or name.startswith(own) else f"{own}{name}"
 
 
-def _place(robot: int, header: Any, pose: Any) -> Place | None:  # noqa: ANN401
+def _place(robot: int, frame: str, pose: Any) -> Place | None:  # noqa: ANN401
     at, by = pose.position, pose.orientation
     position, turn = (at.x, at.y, at.z), (by.x, by.y, by.z, by.w)
     if not all(map(math.isfinite, (*position, *turn))):
         return None
     # Who does not know its orientation often sends zeros, which are no turn at all.
-    return Place(_frame(robot, header), position, turn if any(turn) else NO_TURN)
+    return Place(_frame(robot, frame), position, turn if any(turn) else NO_TURN)
 
 
 def _fix(robot: int, message: Any) -> Fix | None:  # noqa: ANN401
@@ -75,16 +75,21 @@ def _fix(robot: int, message: Any) -> Fix | None:  # noqa: ANN401
     height = altitude if math.isfinite(altitude) else 0.0
     covariance = [float(each) for each in message.position_covariance]
     return Fix(
-        _frame(robot, message.header), latitude, longitude, height, covariance,
+        _frame(robot, message.header.frame_id), latitude, longitude, height, covariance,
         message.position_covariance_type,
     )  # fmt: skip
 
 
 _READERS: Mapping[str, Callable[[int, Any], Place | Fix | None]] = {
-    "nav_msgs/msg/Odometry": lambda robot, got: _place(robot, got.header, got.pose.pose),
-    "geometry_msgs/msg/PoseStamped": lambda robot, got: _place(robot, got.header, got.pose),
+    "nav_msgs/msg/Odometry": lambda robot, got: _place(robot, got.header.frame_id, got.pose.pose),
     "geometry_msgs/msg/PoseWithCovarianceStamped": lambda robot, got: _place(
-        robot, got.header, got.pose.pose
+        robot, got.header.frame_id, got.pose.pose
+    ),
+    "geometry_msgs/msg/PoseWithCovariance": lambda robot, got: _place(robot, "", got.pose),
+    "geometry_msgs/msg/PoseStamped": lambda robot, got: _place(
+        robot, got.header.frame_id, got.pose
     ),
     "sensor_msgs/msg/NavSatFix": _fix,
 }
+PLACES = tuple(_READERS)
+"""The types of messages that say where a robot is, those that are preferred first."""

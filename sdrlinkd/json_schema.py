@@ -1,4 +1,4 @@
-"""JSON schemas of reports, as Foxglove reads them."""
+"""JSON schemas of reports, as Foxglove reads them, over a network and in MCAP files."""
 
 from typing import Any
 

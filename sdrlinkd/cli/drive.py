@@ -1,0 +1,80 @@
+"""`log` and `report`: a drive as one file, and as one page."""
+
+import asyncio
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sdrlinkd.cli.app import app
+from sdrlinkd.cli.listing import directories
+from sdrlinkd.drive import DriveWriter, keep, read_drive
+from sdrlinkd.errors import UserError, ungrouped
+
+NO_PLOTS = "the report needs matplotlib and Jinja2: pip install 'sdrlinkd[plots]'"
+NO_DAEMON = (
+    "log: no daemon of this host is running; start one, or name its directory with --runtime-dir"
+)
+PAGE = "report.html"
+
+
+@app.command("log")
+def log(
+    folder: Annotated[Path, typer.Argument(help="Folder for drive.mcap.")],
+    messages: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PATTERN",
+            help="Keep messages of these topics, too, such as '/rx_*/scan'; repeatable. Messages "
+            "that say where robots are, are kept in any case.",
+        ),
+    ] = None,
+    runtime_dir: Annotated[
+        list[Path] | None,
+        typer.Option(help="Daemon to log, by its runtime directory; may be repeated; "
+                     "default: all of this host."),
+    ] = None,
+) -> None:  # fmt: skip
+    """Keep reports, events and messages of daemons in one file until Ctrl-C."""
+    found = runtime_dir or directories()
+    if not found:
+        raise UserError(NO_DAEMON)
+    writer = DriveWriter(folder)
+    typer.echo(f"keeping {len(found)} daemons in {writer.path}; Ctrl-C ends it")
+    try:
+        with ungrouped():
+            asyncio.run(keep(found, writer, messages or [], lambda: None))
+    finally:
+        writer.close()
+        typer.echo(f"{writer.path}: {writer.n_bytes / 1e6:.1f} MB; sdrlinkctl report {folder}")
+
+
+@app.command("report")
+def report(
+    drive: Annotated[Path, typer.Argument(help="A drive of `sdrlinkctl log`, or its folder.")],
+    out: Annotated[
+        Path | None, typer.Option(help="The page; default: report.html beside the drive.")
+    ] = None,
+    title: Annotated[str, typer.Option(help="Title of the page.")] = "",
+) -> None:
+    """Make one HTML page of a drive: map, delivery, latency, drops, events, what to change."""
+    folder = drive if drive.is_dir() else drive.parent
+    path = out or folder / PAGE
+    write_page(drive, title or f"Drive {folder.resolve().name}", path)
+    typer.echo(f"wrote {path}")
+
+
+def write_page(drive: Path, title: str, path: Path | None = None) -> None:
+    """Write the page of a drive, by default beside it. Raises UserError."""
+    try:
+        from sdrlinkd.drive import report_page
+    except ModuleNotFoundError as error:
+        if error.name not in ("matplotlib", "jinja2"):
+            raise
+        raise UserError(NO_PLOTS) from None
+    found = read_drive(drive)
+    path = path or found.path.parent / PAGE
+    try:
+        path.write_text(report_page(found, title))
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from None
