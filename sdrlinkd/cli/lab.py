@@ -120,7 +120,7 @@ def lab(
             if console.is_terminal:
                 live.update(live_table(title, state), refresh=True)
 
-        report = run_lab(options, watch, kept.places)
+        report = run_lab(options, watch, kept.passed)
     write_report(out / REPORT, report)
     wall_s = time.monotonic() - began
     pictures.draw(report, chosen, out / PICTURE, _caption(report, scenario))

@@ -1,10 +1,10 @@
 """The drive of a run, as `sdrlinkctl log` would have kept it."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 from sdrlinkd.adapters import PLACES
-from sdrlinkd.demo import Sample
+from sdrlinkd.demo import Sample, Trace
 from sdrlinkd.drive import DRIVE, Chronicle, DriveWriter, received, sent
 from sdrlinkd.reports import Snapshot
 
@@ -22,6 +22,7 @@ class RunDrive:
         (folder / DRIVE).unlink(missing_ok=True)
         self._writer = DriveWriter(folder)
         self._chronicles: dict[int, Chronicle] = {}
+        self._senders: set[int] = set()
 
     def see(self, snapshots: Iterable[Snapshot], at_s: float) -> None:
         """Take the reports of all daemons."""
@@ -29,19 +30,23 @@ class RunDrive:
             chronicle = self._chronicles.setdefault(each.node, Chronicle(self._writer))
             chronicle.see(each, self._ns(at_s))
 
-    def places(
-        self, robot: int, at: int | None, types: Mapping[str, str],
-        samples: Mapping[str, Iterable[Sample]], begin_s: float,
-    ) -> None:  # fmt: skip
-        """Take the messages of a robot that say where it is, as `at` received them."""
-        for name, each in samples.items():
-            if types.get(name) not in PLACES:
-                continue
-            topic = f"/{name}"
-            named = sent(robot, topic) if at is None else received(at, robot, topic)
-            for sample in each:
-                at_ns = self._ns(sample.at - begin_s)
-                self._writer.message(named, types[name], sample.payload, at_ns)
+    def passed(self, sender: int, receiver: int, trace: Trace, begin_s: float) -> None:
+        """Keep the messages of one robot to another one that say where it is.
+
+        The trace's clock showed `begin_s` when the run began.
+        """
+        if sender not in self._senders:
+            self._senders.add(sender)
+            for name, samples in trace.sent.items():
+                self._keep(sent(sender, f"/{name}"), trace.types.get(name, ""), samples, begin_s)
+        for name, pairs in trace.matches()[0].items():
+            topic, got = received(receiver, sender, f"/{name}"), [late for _, late in pairs]
+            self._keep(topic, trace.types.get(name, ""), got, begin_s)
+
+    def _keep(self, topic: str, kind: str, samples: Iterable[Sample], begin_s: float) -> None:
+        if kind in PLACES:
+            for each in samples:
+                self._writer.message(topic, kind, each.payload, self._ns(each.at - begin_s))
 
     def close(self) -> None:
         """Close the file."""

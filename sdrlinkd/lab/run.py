@@ -2,7 +2,7 @@
 
 import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import permutations
 from pathlib import Path
@@ -11,6 +11,7 @@ from backends import Answer, BackendError, HubWatch
 from sdrlinkd.demo import (
     Sample,
     Source,
+    Trace,
     daemon_process,
     problems_of,
     run_folder,
@@ -65,15 +66,12 @@ class _Robot:
 
 
 Watch = Callable[[LabState], None]
-Keep = Callable[[int, int | None, Mapping[str, str], Mapping[str, list[Sample]], float], None]
-"""Takes messages of a robot: who received them (None: as published), types, samples, the begin."""
+Keep = Callable[[int, int, Trace, float], None]
+"""Takes what passed from a robot to another one, and when the run began."""
 
 
 def run_lab(options: LabOptions, watch: Watch, keep: Keep | None = None) -> LabReport:
-    """Run a scenario to its end, and leave nothing running in any case. Raises UserError.
-
-    `keep` gets what the robots sent, and what each pair received.
-    """
+    """Run a scenario to its end, and leave nothing running in any case. Raises UserError."""
     scenario = options.scenario
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(run_folder())
@@ -96,23 +94,7 @@ def run_lab(options: LabOptions, watch: Watch, keep: Keep | None = None) -> LabR
         snapshots = _settled(robots)
         watch(LabState(scenario.until_s, scenario.until_s, snapshots))
         problems = {robot.id: problems_of(robot.directory) for robot in robots}
-        if keep is not None:
-            _keep(keep, robots, _sent(robots, scenario), began_at)
-        return _report(options, robots, snapshots, problems, began_at)
-
-
-def _keep(
-    keep: Keep, robots: list[_Robot], sent: dict[int, dict[str, list[Sample]]], began_at: float
-) -> None:
-    for sender in robots:
-        types = {topic.name: topic.type for topic in sender.source.registry.topics}
-        keep(sender.id, None, types, sent[sender.id], began_at)
-        for receiver in robots:
-            if receiver is not sender:
-                heard = receiver.listener.received[sender.id]
-                pairs, _ = trace_of(sender.source, sent[sender.id], heard).matches()
-                got = {name: [late for _, late in found] for name, found in pairs.items()}
-                keep(sender.id, receiver.id, types, got, began_at)
+        return _report(options, robots, snapshots, problems, began_at, keep)
 
 
 def _start_hub(stack: contextlib.ExitStack, directory: Path, options: LabOptions) -> Process:
@@ -247,6 +229,7 @@ def _report(
     snapshots: list[Snapshot],
     problems: dict[int, list[str]],
     began_at: float,
+    keep: Keep | None,
 ) -> LabReport:
     scenario = options.scenario
     sent = _sent(robots, scenario)
@@ -258,6 +241,8 @@ def _report(
         if not sent[sender.id] or not scenario.in_reach(sender.id, receiver.id):
             continue
         trace = trace_of(sender.source, sent[sender.id], receiver.listener.received[sender.id])
+        if keep is not None:
+            keep(sender.id, receiver.id, trace, began_at)
 
         def counts(sample: Sample, ids: tuple[int, int] = (sender.id, receiver.id)) -> bool:
             """Nobody can expect what was sent while one of the two was off."""

@@ -62,13 +62,14 @@ def come_to(monkeypatch):
     seen = []
 
     def come_to(made):
-        def pretend(options, watch):
+        def pretend(options, watch, keep):
             seen.append(options)
             return made
 
         monkeypatch.setattr("sdrlinkd.cli.lab.run_lab", pretend)
         # Takes a second, and has separate tests.
         monkeypatch.setattr("sdrlinkd.lab.pictures.draw", lambda *_: None)
+        monkeypatch.setattr("sdrlinkd.cli.lab.write_page", lambda *_: None)
         return seen
 
     return come_to
