@@ -4,10 +4,9 @@ import asyncio
 import logging
 from collections.abc import Callable, Sequence
 
-from sdrlinkd.asking import snapshot_at
+from sdrlinkd.asking import Asker
 from sdrlinkd.client import (
     AsyncSubscriber,
-    ControlClient,
     EnvelopeMismatchError,
     Message,
     NoDaemonError,
@@ -26,6 +25,7 @@ class DaemonSide:
 
     def __init__(self, directory: str | None) -> None:
         self._directory = directory
+        self._asker = Asker(directory, ANSWER_S)
         self.snapshot: Snapshot | None = None
         """The daemon's last report; None while it does not answer."""
 
@@ -58,15 +58,10 @@ class DaemonSide:
         With None while it is away, or of another version.
         """
         while True:
-            self.snapshot = await asyncio.to_thread(snapshot_at, self._directory, ANSWER_S)
+            self.snapshot = await self._asker.snapshot()
             see(self.snapshot)
             await asyncio.sleep(POLL_S)
 
     async def declare(self, name: str, kind: str) -> None:
         """Declare a topic of type `kind` on the bus. Raises RefusedError and NoDaemonError."""
-
-        def ask() -> None:
-            with ControlClient(self._directory, timeout_s=ANSWER_S) as control:
-                control.ask("declare", {"name": name, "type": kind})
-
-        await asyncio.to_thread(ask)
+        await self._asker.ask("declare", {"name": name, "type": kind})

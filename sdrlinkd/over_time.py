@@ -3,9 +3,8 @@
 from collections.abc import Iterator
 from typing import Any
 
+from sdrlinkd.client import QOS
 from sdrlinkd.reports import Snapshot
-
-CLASSES = ("urgent", "latency", "default", "bulk")
 
 
 def figures_of(
@@ -46,7 +45,7 @@ def _air(snapshot: Snapshot, before: Snapshot | None) -> Figures:
     if before is None:
         return
     span_s = snapshot.uptime_s - before.uptime_s
-    for name in CLASSES:
+    for name in QOS:
         spent_s = snapshot.link.airtime_by_class_s.get(name, 0.0)
         spent_s -= before.link.airtime_by_class_s.get(name, 0.0)
         yield name, 100 * max(0.0, spent_s) / span_s
@@ -55,7 +54,7 @@ def _air(snapshot: Snapshot, before: Snapshot | None) -> Figures:
 
 
 def _queue(snapshot: Snapshot, _: Snapshot | None) -> Figures:
-    for name in CLASSES:
+    for name in QOS:
         yield name, snapshot.link.tx.queued_by_class.get(name, 0)
 
 
@@ -64,7 +63,7 @@ def _wait(snapshot: Snapshot, _: Snapshot | None) -> Figures:
     for each in snapshot.link.topics:
         if each.queue_ms is not None and each.queued:
             longest[each.qos] = max(longest.get(each.qos, 0.0), each.queue_ms)
-    for name in CLASSES:
+    for name in QOS:
         yield name, longest.get(name)
 
 

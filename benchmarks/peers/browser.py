@@ -20,8 +20,6 @@ FLAGS = (
 )  # fmt: skip
 T = TypeVar("T")
 PATIENCE_S = 60.0
-OF_NO_WEIGHT = "reloading because implicit handshake failed"
-"""Said by the page on a machine that is so busy that the first contact takes too long."""
 
 
 class Browser:
@@ -97,7 +95,7 @@ class Browser:
         logged = self.driver.get_log("browser")  # type: ignore[no-untyped-call]
         return [
             each["message"] for each in logged
-            if each["level"] in ("SEVERE", "WARNING") and OF_NO_WEIGHT not in each["message"]
+            if each["level"] in ("SEVERE", "WARNING")
         ]  # fmt: skip
 
     def asked(self, page: str) -> list[str]:

@@ -1,15 +1,18 @@
 """`log` and `report`: a drive as one file, and as one page."""
 
 import asyncio
+import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.live import Live
 
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.drive import DriveWriter, keep, read_drive
 from sdrlinkd.errors import UserError, ungrouped
+from sdrlinkd.tables import screen_console
 
 NO_PLOTS = "the report needs matplotlib and Jinja2: pip install 'sdrlinkd[plots]'"
 NO_DAEMON = (
@@ -42,8 +45,17 @@ def log(
     writer = DriveWriter(folder)
     typer.echo(f"keeping {len(found)} daemons in {writer.path}; Ctrl-C ends it")
     try:
-        with ungrouped():
-            asyncio.run(keep(found, writer, messages or [], lambda: None))
+        with (
+            ungrouped(),
+            Live(console=screen_console(), auto_refresh=False, transient=True) as live,
+        ):
+            began_at = time.monotonic()
+
+            def progress() -> None:
+                lasted_s = time.monotonic() - began_at
+                live.update(f"{lasted_s:.0f} s, {writer.n_bytes / 1e6:.1f} MB", refresh=True)
+
+            asyncio.run(keep(found, writer, messages or [], progress))
     finally:
         writer.close()
         typer.echo(f"{writer.path}: {writer.n_bytes / 1e6:.1f} MB; sdrlinkctl report {folder}")

@@ -12,24 +12,22 @@ import typer
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.listening import host_and_port
 from sdrlinkd.cli.listing import directories
-from sdrlinkd.config import FleetParams
+from sdrlinkd.config import ENDPOINT, FLEET_NAME, FleetParams
 from sdrlinkd.errors import UserError
 
 NO_NICEGUI = "the page needs NiceGUI: pip install 'sdrlinkd[web]'"
-NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
-ENDPOINT = re.compile(r"[a-z]+/\S+")
 TOKEN = "SDRLINK_WEB_TOKEN"  # noqa: S105 (the name of a variable)
 
 
 def _fleet_name(name: str | None) -> str | None:
-    if name is not None and not NAME.fullmatch(name):
+    if name is not None and not re.match(FLEET_NAME, name):
         raise UserError(f'--fleet: got "{name}"; allowed: letters, digits, _ and -')
     return name
 
 
 def _endpoints(given: list[str] | None) -> list[str] | None:
     for each in given or ():
-        if not ENDPOINT.fullmatch(each):
+        if not re.match(ENDPOINT, each):
             raise UserError(f'--connect: got "{each}"; allowed: an endpoint such as tcp/base:7447')
     return given
 

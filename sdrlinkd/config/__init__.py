@@ -3,7 +3,7 @@
 from sdrlinkd.config.backends import backend_of, typed_config
 from sdrlinkd.config.describe import allowed as allowed_text
 from sdrlinkd.config.describe import given as given_text
-from sdrlinkd.config.fleet import FleetParams
+from sdrlinkd.config.fleet import ENDPOINT, FLEET_NAME, FleetParams
 from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
 from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
@@ -23,6 +23,8 @@ from sdrlinkd.config.setup import TF_TYPE, UNBOUNDED_TYPES, Setup, make_setup
 from sdrlinkd.config.topics import load_registry
 
 __all__ = [
+    "ENDPOINT",
+    "FLEET_NAME",
     "SIMULATED_HZ",
     "TF_TYPE",
     "UNBOUNDED_TYPES",

@@ -5,8 +5,11 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-FleetName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_-]{1,64}\Z")]
-Endpoint = Annotated[str, Meta(pattern=r"^[a-z]+/\S+\Z")]
+FLEET_NAME = r"^[A-Za-z0-9_-]{1,64}\Z"
+ENDPOINT = r"^[a-z]+/\S+\Z"
+"""Patterns of names of fleets, and of Zenoh's endpoints."""
+FleetName = Annotated[str, Meta(pattern=FLEET_NAME)]
+Endpoint = Annotated[str, Meta(pattern=ENDPOINT)]
 
 
 class FleetParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

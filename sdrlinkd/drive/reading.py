@@ -1,5 +1,6 @@
 """Reads a drive into what its report is made of."""
 
+import struct
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -94,7 +95,7 @@ def read_drive(path: Path) -> Drive:
                 _take(drive, topic, (time_ns - drive.begin_ns) / 1e9, kind, data)
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}; {NO_DRIVE}") from None
-    except (McapError, msgspec.MsgspecError, ValueError) as error:
+    except (McapError, msgspec.MsgspecError, ValueError, struct.error, MemoryError) as error:
         raise UserError(f"{path}: cannot be read ({error}); {NO_DRIVE}") from None
     if not drive.stations:
         raise UserError(f"{path}: has no report of a daemon; {NO_DRIVE}")

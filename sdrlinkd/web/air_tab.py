@@ -32,7 +32,7 @@ class AirTab:
         station, now_ms = self._viewer.station, time.time_ns() / 1e6
         if station is None:
             return
-        station.air_wanted_at = now_s()
+        station.look_at_air(now_s())
         air = station.air
         air.forget_before(now_ms - 1000 * KEPT_S)
         bars = list(air.since(self._told))

@@ -67,6 +67,21 @@ def series(name: str, history: History) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
+def newest(history: History, since_ms: int) -> list[list[Any]]:
+    """What has come since: for each time, (ms since 1970, values by picture and line)."""
+    found: list[list[Any]] = []
+    for back in range(1, len(history.times) + 1):
+        at_ms = round(1000 * history.times[-back])
+        if at_ms <= since_ms:
+            break
+        values = {
+            name: {line: _rounded(values[-back]) for line, values in lines.items()}
+            for name, lines in history.lines.items()
+        }
+        found.insert(0, [at_ms, values])
+    return found
+
+
 def empty_waterfall() -> dict[str, Any]:
     """The options of the picture of ages, before anything is known."""
     return {

@@ -8,6 +8,9 @@ from sdrlinkd.reports import Snapshot
 from sdrlinkd.web.positions import PREFERENCE
 from sdrlinkd.web.world import World
 
+MOST_WAITING = 200
+"""Positions that wait for this program; further ones are dropped."""
+
 
 class DaemonFeed:
     """Follows the daemon at `directory` until `run` is cancelled."""
@@ -22,6 +25,7 @@ class DaemonFeed:
             lambda _, kind: kind in PREFERENCE,
             self._take_air,
             lambda: self._station.wants_air(time.monotonic()),
+            MOST_WAITING,
         )
         self._station = world.station(self._key, directory.name, self._watch.ask)
 
@@ -31,7 +35,7 @@ class DaemonFeed:
 
     def _see(self, snapshot: Snapshot | None) -> None:
         if snapshot is not None:
-            self._station.snapshot, self._station.at = snapshot, time.monotonic()
+            self._station.report(snapshot, time.monotonic())
 
     def _take(self, source: Source, cdr: bytes) -> None:
         self._world.take_position(

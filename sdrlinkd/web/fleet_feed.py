@@ -31,8 +31,8 @@ async def _look(world: World, client: FleetClient) -> None:
             except msgspec.MsgspecError:
                 continue  # of another version
             if snapshot is not None:
-                station = world.station(_key(gateway), f"gateway {gateway}")
-                station.snapshot, station.at = snapshot, time.monotonic()
+                name = f"gateway {gateway}"
+                world.station(name, name).report(snapshot, time.monotonic())
         await asyncio.sleep(POLL_S)
 
 
@@ -43,7 +43,3 @@ async def _listen(world: World, client: FleetClient) -> None:
             world.stations, message.robot, message.topic, message.passed.ty, message.payload,
             time.monotonic(),
         )  # fmt: skip
-
-
-def _key(gateway: int) -> str:
-    return f"gateway {gateway}"

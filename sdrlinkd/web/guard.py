@@ -3,7 +3,7 @@
 import hmac
 import secrets
 from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import SplitResult, parse_qs, urlsplit
 
 from starlette.datastructures import Headers
 from starlette.responses import PlainTextResponse, RedirectResponse
@@ -54,13 +54,13 @@ class Guard:
 
     def _is_own(self, headers: Headers) -> bool:
         host = headers.get("host", "")
-        if self._is_local and not self._token and _name(f"//{host}") not in LOCAL_NAMES:
+        if self._is_local and not self._token and _split(f"//{host}").hostname not in LOCAL_NAMES:
             return False
         origin = headers.get("origin")
         if origin is None:
             return True
         own = {host, headers.get("x-forwarded-host", host)} if self._token else {host}
-        return str(urlsplit(origin).netloc) in own
+        return _split(origin).netloc in own
 
     def _knows(self, token: str) -> bool:
         return hmac.compare_digest(token.encode(), self._token.encode())
@@ -91,8 +91,9 @@ def _asked_token(scope: Scope) -> str:
     return asked.get("token", [""])[0]
 
 
-def _name(url: str) -> str:
+def _split(url: str) -> SplitResult:
+    """The parts of an address; empty ones of what is none."""
     try:
-        return urlsplit(url).hostname or ""
+        return urlsplit(url)
     except ValueError:
-        return ""
+        return urlsplit("")

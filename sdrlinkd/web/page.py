@@ -14,6 +14,10 @@ from sdrlinkd.web.viewer import Viewer, now_s
 from sdrlinkd.web.what_if_tab import WhatIfTab
 from sdrlinkd.web.world import Station
 
+PERIOD_S = 0.2
+SLOW = 5
+"""Updates of the map for one of everything else."""
+
 
 class Tab(Protocol):
     """What a tab offers."""
@@ -27,9 +31,6 @@ class Tab(Protocol):
         """Show what is new."""
 
 
-PERIOD_S = 0.2
-SLOW = 5
-"""Updates of the map for one of everything else."""
 STYLE = (Path(__file__).parent / "style.css").read_text()
 TABS: dict[str, type[Tab]] = {
     "Map": MapTab,

@@ -7,6 +7,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 import uvicorn
 from fastapi import FastAPI
@@ -122,5 +123,5 @@ def _listen(options: Options) -> socket.socket:
 def _address(options: Options, port: int) -> str:
     host = f"[{options.host}]" if ":" in options.host else options.host
     scheme = "http" if options.certificate is None else "https"
-    token = f"?token={options.token}" if options.token else ""
+    token = f"?{urlencode({'token': options.token})}" if options.token else ""
     return f"{scheme}://{host}:{port}/{token}"

@@ -5,8 +5,6 @@ from typing import Any, NamedTuple
 
 from sdrlinkd.reports import ReceivedTopicReport, Snapshot, TopicReport
 
-QOS = ("urgent", "latency", "default", "bulk")
-
 SENT = (
     ("name", "topic"), ("qos", "class"), ("priority", "priority"), ("rate", "a second"),
     ("bytes", "kB/s"), ("lifespan", "lifespan"), ("queued", "queued"), ("dropped", "dropped"),

@@ -7,9 +7,8 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from sdrlinkd.client import NoDaemonError, RefusedError
+from sdrlinkd.client import QOS, NoDaemonError, RefusedError
 from sdrlinkd.web.topic_data import (
-    QOS,
     RECEIVED,
     SENT,
     SLIDERS,

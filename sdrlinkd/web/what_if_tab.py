@@ -6,9 +6,9 @@ from typing import Any
 
 from nicegui import ui
 
-from sdrlinkd.client import NoDaemonError, RefusedError
+from sdrlinkd.client import QOS, NoDaemonError, RefusedError
 from sdrlinkd.errors import UserError
-from sdrlinkd.web.topic_data import QOS, SLIDERS, Slider, columns, nearest, shown
+from sdrlinkd.web.topic_data import SLIDERS, Slider, columns, nearest, shown
 from sdrlinkd.web.viewer import Viewer
 from sdrlinkd.web.what_if import Choice, Outcome, Traffic, foresee, loads_of, traffic_of
 

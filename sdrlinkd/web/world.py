@@ -36,8 +36,7 @@ class Station:
     snapshot: Snapshot | None = None
     at: float = float("-inf")
     """When the last report came, in s."""
-    air_wanted_at: float = float("-inf")
-    """When somebody last looked at the air there, in s."""
+    _air_wanted_at: float = float("-inf")
     history: History = field(default_factory=History)
     air: AirLog = field(default_factory=AirLog)
 
@@ -46,9 +45,17 @@ class Station:
         """Id of its robot; None until it has said it."""
         return None if self.snapshot is None else self.snapshot.node
 
+    def report(self, snapshot: Snapshot, now: float) -> None:
+        """Take a report."""
+        self.snapshot, self.at = snapshot, now
+
+    def look_at_air(self, now: float) -> None:
+        """Note that somebody looks at the air there."""
+        self._air_wanted_at = now
+
     def wants_air(self, now: float) -> bool:
         """Whether somebody has looked at the air there lately."""
-        return now < self.air_wanted_at + LOOKS_S
+        return now < self._air_wanted_at + LOOKS_S
 
     def is_away(self, now: float) -> bool:
         """Whether it has not reported lately."""

@@ -7,11 +7,11 @@ import pytest
 import zmq
 
 from sdrlinkd.airwatch import AirWatch
+from sdrlinkd.bus import AIR_TAP
 from sdrlinkd.client import OUT_SOCKET, Publisher, endpoint
 from sdrlinkd.pdulink import AirSeen, BurstSeen, Heard
 from sdrlinkd.wire import Entry, Pdu, build, source_and_class
 
-AIR = b"\0air\0"
 LOOPBACK = 'namespace = "robot_1"\nbackend = "loopback"\n[modem]\nrate_hz = 1e6\nmcs = 3\n'
 CDR = b"\0\1\0\0" + bytes(300)
 
@@ -23,7 +23,7 @@ def test_own_bursts_and_those_heard_are_told_while_somebody_watches(start_daemon
     with zmq.Context() as context, context.socket(zmq.SUB) as watching:
         watching.linger = 0
         watching.connect(endpoint(daemon.directory, OUT_SOCKET))
-        watching.subscribe(AIR)
+        watching.subscribe(AIR_TAP)
         with Publisher(runtime_dir=daemon.directory) as out:
             deadline = time.monotonic() + 30
             while len(bands) < 5 or not any("s" in each for each in heard):

@@ -1,10 +1,13 @@
 """A drive is written, read again, and told on one page."""
 
+import contextlib
 import json
 import math
 
 import msgspec
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from sdrlinkd.cli import run
@@ -20,6 +23,7 @@ from sdrlinkd.drive import (
 )
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import ReceivedTopicReport, VerdictReport
+from tests.laws import law
 from tests.reported import neighbor, snapshot, topic
 from tests.web.test_map import ODOMETRY, odometry
 
@@ -168,7 +172,8 @@ def test_the_page_has_everything_and_names_are_text(tmp_path):
     assert page.count("data:image/png;base64,") == 3
     assert "robot 2 hears us at 0 dB" in page
     assert "100 %" in page
-    assert "dropped 38 messages as tx_expired: " in page
+    assert "tx_expired: 38 messages, " in page
+    assert "What helps: send it less often" in page
     assert "http" not in page.replace(HOSTILE, ""), "nothing is fetched from elsewhere"
 
 
@@ -192,3 +197,24 @@ def test_a_drive_is_not_written_over(tmp_path):
     write(tmp_path, report(0))
     with pytest.raises(UserError, match="is there already; give another folder"):
         DriveWriter(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def octets(tmp_path_factory):
+    """A whole drive."""
+    folder = tmp_path_factory.mktemp("drive")
+    write(folder, report(0), report(1))
+    return (folder / DRIVE).read_bytes()
+
+
+@law(200)
+@given(st.data())
+def test_a_damaged_file_is_read_or_refused_in_a_sentence(octets, tmp_path_factory, data):
+    damaged = bytearray(octets)
+    for at in data.draw(st.lists(st.integers(0, len(octets) - 1), max_size=4)):
+        damaged[at] ^= data.draw(st.integers(1, 255))
+    del damaged[data.draw(st.integers(0, len(octets))) :]
+    path = tmp_path_factory.getbasetemp() / "damaged.mcap"
+    path.write_bytes(damaged)
+    with contextlib.suppress(UserError):
+        read_drive(path)

@@ -54,6 +54,8 @@ def test_other_pages_of_the_same_browser_do_not_reach_it(tmp_path):
         assert joins(url, Origin=own)
         assert not joins(url, Origin=strange)
         assert get(url, Origin=strange)[0] == 403
+        assert get(url, Origin="http://[")[0] == 403
+        assert get(url, Host="[")[0] == 403
         status, told, _ = get(url, Host="evil.example")
         assert status == 403
         assert "open it at the address" in told
@@ -81,6 +83,14 @@ def test_with_a_token_nobody_else_comes_in(tmp_path):
         assert joins(url, Cookie=ours, Origin=own)
         assert not joins(url, Cookie=ours, Origin="http://evil.example")
         assert get(url, Cookie="sdrlink_token=x; ;;=")[0] == 403
+
+
+def test_a_token_may_contain_anything(tmp_path):
+    token = 'a&b #"ü;='
+    with served("--listen", "127.0.0.1:0", "--token", folder=tmp_path, token=token) as (url, _):
+        status, _, headers = get(url, f"/?{url.query}")
+        assert status == 303
+        assert get(url, Cookie=headers["set-cookie"].split("; HttpOnly")[0])[0] == 200
 
 
 def test_behind_a_proxy_its_name_counts(tmp_path):

@@ -1,7 +1,14 @@
 """The last ten minutes of a station, once a second."""
 
 from sdrlinkd.reports import ClockReport
-from sdrlinkd.web.charts import PICTURES, empty_chart, empty_waterfall, series, waterfall
+from sdrlinkd.web.charts import (
+    PICTURES,
+    empty_chart,
+    empty_waterfall,
+    newest,
+    series,
+    waterfall,
+)
 from sdrlinkd.web.history import KEPT_S, MOST_LINES, History
 from tests.reported import neighbor, snapshot, topic
 
@@ -68,3 +75,17 @@ def test_pictures_are_drawn_of_it():
         assert isinstance(series(name, history), list)
     assert empty_waterfall()["tooltip"]["renderMode"] == "richText"
     assert waterfall(snapshot())["yAxis"] == {"data": []}
+
+
+def test_a_browser_gets_only_what_is_new():
+    history = History()
+    for second in range(5):
+        history.add(snapshot(neighbors=[neighbor(2, snr_db=20.0 + second)]), float(second))
+    told = newest(history, 2000)
+    assert [at_ms for at_ms, _ in told] == [3000, 4000]
+    assert [values["snr"]["robot 2 here"] for _, values in told] == [23, 24]
+    assert newest(history, 4000) == []
+    # What was appended to what was there is the whole.
+    whole = {each["name"]: each["data"] for each in series("snr", history)}
+    appended = [(at_ms, values["snr"]["robot 2 here"]) for at_ms, values in newest(history, 0)]
+    assert whole["robot 2 here"][1:] == appended

@@ -36,7 +36,7 @@ def world_of(*snapshots):
     world = World()
     for each in snapshots:
         station = world.station(f"at {each.node}", "")
-        station.snapshot, station.at = each, 0.0
+        station.report(each, 0.0)
     return world
 
 

@@ -22,6 +22,15 @@ def n_colors(png):
     return len(Image.open(io.BytesIO(png)).convert("RGB").getcolors(1 << 24))
 
 
+def n_points(browser):
+    """Points of the first line of the first picture."""
+    return browser.run(
+        "const [chart] = document.querySelectorAll('.sdr-chart');"
+        "const series = getElement(chart.id.slice(1)).chart.getOption().series;"
+        "return series.length ? series[0].data.length : 0"
+    )
+
+
 def test_the_map_follows_robots_and_shows_both_paths(lab, open_browser):
     browser = open_browser(lab[0])
     for robot in (1, 2):
@@ -56,6 +65,9 @@ def test_every_view_is_drawn(view, lab, open_browser):
     browser.see(lambda: n_colors(browser.picture()) > 40, "a picture")
     if view == "Link":
         browser.see(lambda: len(browser.all(".sdr-chart canvas")) >= 8, "charts")
+        # The first update brings all of it, the next ones what is new.
+        first = browser.see(lambda: n_points(browser), "lines")
+        browser.see(lambda: n_points(browser) >= first + 4, "what is new")
     elif view == "Air":
         browser.see(lambda: " bursts, " in browser.text, "bursts")
         browser.see(lambda: "Last burst: QAM16" in browser.text, "constellation")
