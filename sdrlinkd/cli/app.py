@@ -54,6 +54,13 @@ RuntimeDir = Annotated[
         show_default=False,
     ),
 ]
+RuntimeDirs = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--runtime-dir",
+        help="Daemon, by its runtime directory; may be repeated; default: all of this host.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable JSON.")]
 Watch = Annotated[
     bool,

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.live import Live
 
-from sdrlinkd.cli.app import app
+from sdrlinkd.cli.app import RuntimeDirs, app
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.drive import DriveWriter, keep, read_drive
 from sdrlinkd.errors import UserError, ungrouped
@@ -32,11 +32,7 @@ def log(
             "that say where robots are, are kept in any case.",
         ),
     ] = None,
-    runtime_dir: Annotated[
-        list[Path] | None,
-        typer.Option(help="Daemon to log, by its runtime directory; may be repeated; "
-                     "default: all of this host."),
-    ] = None,
+    runtime_dir: RuntimeDirs = None,
 ) -> None:  # fmt: skip
     """Keep reports, events and messages of daemons in one file until Ctrl-C."""
     found = runtime_dir or directories()

@@ -1,12 +1,11 @@
 """`exporter`: the figures of this host's daemons for Prometheus."""
 
 import threading
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sdrlinkd.cli.app import app
+from sdrlinkd.cli.app import RuntimeDirs, app
 from sdrlinkd.cli.listening import host_and_port
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.errors import UserError
@@ -16,11 +15,7 @@ NO_CLIENT = "the exporter needs prometheus-client: pip install 'sdrlinkd[metrics
 
 @app.command("exporter")
 def exporter(
-    runtime_dir: Annotated[
-        list[Path] | None,
-        typer.Option(help="Daemon to report, by its runtime directory; may be repeated; "
-                     "default: all of this host."),
-    ] = None,
+    runtime_dir: RuntimeDirs = None,
     listen: Annotated[
         str, typer.Option(metavar="HOST:PORT", help="Where Prometheus asks.")
     ] = "127.0.0.1:9477",

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from sdrlinkd.cli.app import app
+from sdrlinkd.cli.app import RuntimeDirs, app
 from sdrlinkd.cli.listening import host_and_port
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.config import ENDPOINT, FLEET_NAME, FleetParams
@@ -34,11 +34,7 @@ def _endpoints(given: list[str] | None) -> list[str] | None:
 
 @app.command("web")
 def web(
-    runtime_dir: Annotated[
-        list[Path] | None,
-        typer.Option(help="Daemon to show, by its runtime directory; may be repeated; "
-                     "default: all of this host."),
-    ] = None,
+    runtime_dir: RuntimeDirs = None,
     fleet: Annotated[
         str | None,
         typer.Option(help="Show the gateways of this fleet, over Zenoh.", callback=_fleet_name),
