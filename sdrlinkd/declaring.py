@@ -1,5 +1,6 @@
 """Takes topics that producers declare while the daemon runs."""
 
+import fnmatch
 import logging
 import time
 from math import inf
@@ -13,7 +14,7 @@ from sdrlinkd.errors import DeclarationError
 from sdrlinkd.link import Link
 from sdrlinkd.offers import Declaration
 from sdrlinkd.policies import Policies
-from sdrlinkd.wire import topic_type
+from sdrlinkd.wire import read_origin, topic_type
 
 if TYPE_CHECKING:
     # Its package imports the bag readers, which the daemon on a robot does not need.
@@ -86,6 +87,7 @@ class Declaring:
         """Raise DeclarationError if a bus topic cannot be that of the topic `name` on the air."""
         if not given.startswith("/"):
             raise DeclarationError(f"name: got {given[:128]!r}; allowed: a name with leading slash")
+        self._check_origin(given, name)
         known = self._link.topic_named(name)
         if known is None:
             return
@@ -97,6 +99,18 @@ class Declaring:
         if other != given:
             raise DeclarationError(
                 f"{given}: on the air it has the name of {other}, {name}; use one of the two"
+            )
+
+    def _check_origin(self, given: str, name: str) -> None:
+        """Raise DeclarationError for another robot's topic that this one must not send."""
+        robot, topic = read_origin(name)
+        if robot is None:
+            return
+        allowed = self._setup.config.fleet.bridge
+        if robot == self._setup.node_id or not any(fnmatch.fnmatchcase(topic, p) for p in allowed):
+            raise DeclarationError(
+                f"{given}: messages of robot {robot} appear under this name; a daemon sends those "
+                f"of other robots, of topics in fleet.bridge ({', '.join(allowed) or 'none'})"
             )
 
     def demand(self, now: float, arguments: dict[str, Any]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from sdrlinkd.config import Setup, explain_policy
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import DEFAULT_POLICY, Link, Told, TopicPolicy
 from sdrlinkd.offers import Declaration, merged
-from sdrlinkd.wire import Registry
+from sdrlinkd.wire import Registry, read_origin
 
 log = logging.getLogger("sdrlinkd")
 
@@ -54,9 +54,8 @@ class Policies:
 
     def told(self, topic_id: int) -> Told:
         """Where a topic's policy comes from."""
-        offer, name = self._offers.get(topic_id), self._link.topic(topic_id).name
+        offer, configured = self._offers.get(topic_id), self._configured_for(topic_id)
         # The file wins, key by key.
-        configured = self._configured.get(name, DEFAULT_POLICY)
         is_offered = offer is not None and merged(configured, offer.policy) != configured
         words = offer.words if offer is not None and is_offered else ""
         return Told(self._setup.source, self.changed.get(topic_id, ()), words)
@@ -127,10 +126,15 @@ class Policies:
 
     def _policy(self, topic_id: int) -> TopicPolicy:
         """The policy by the file and the topic's producers, with what was set since."""
-        configured = self._configured.get(self._link.topic(topic_id).name, DEFAULT_POLICY)
+        configured = self._configured_for(topic_id)
         offer = self._offers.get(topic_id)
         policy = configured if offer is None else merged(configured, offer.policy)
         return msgspec.structs.replace(policy, **self.changed.get(topic_id, {}))
+
+    def _configured_for(self, topic_id: int) -> TopicPolicy:
+        """The policy by the file; of another robot's topic, that of its name there."""
+        name = read_origin(self._link.topic(topic_id).name).name
+        return self._configured.get(name, DEFAULT_POLICY)
 
 
 def _told(value: object) -> object:

@@ -37,7 +37,7 @@ class MessageTypes:
         """The stop message of a topic as CDR; None if its type is unknown, or lacks a field."""
         if topic.about is None:
             return self._stops.get(topic.base)
-        policy = self._named.get(topic.name)
+        policy = self._named.get(topic.at_origin)
         try:
             return cdr_from_fields(topic.type, policy.stop if policy else {}, topic.name)
         except UserError:

@@ -143,7 +143,9 @@ class Bus:
     def publish_stop(self, src: int, topic: HeardTopic, payload: bytes) -> None:
         """Hand a topic's stop message to its consumers, as the topic has fallen silent."""
         self._retention.forget((src, topic.base))
-        header = envelope.OutHeader(s=src, n=0, tr=time.time_ns(), ty=topic.type, stop=True)
+        origin = topic.origin(src)
+        header = envelope.OutHeader(s=origin, n=0, tr=time.time_ns(), ty=topic.type, stop=True)
+        header.v = None if origin == src else src
         self._out.send_multipart(envelope.encode(self._frame_out(src, topic), header, payload))
         self._out_reader.recheck()
 

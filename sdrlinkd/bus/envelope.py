@@ -55,6 +55,7 @@ class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
     stop: bool = False
     late: bool = False
     sr: int | None = None
+    v: int | None = None
 
 
 class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):

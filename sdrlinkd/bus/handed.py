@@ -13,7 +13,7 @@ def header_of(
     `received_ns` is when it arrived, in ns since 1970.
     """
     header = OutHeader(
-        s=message.src,
+        s=message.topic.origin(message.src),
         n=message.number,
         tr=received_ns,
         ty=message.topic.type,
@@ -26,6 +26,8 @@ def header_of(
         ts=times.sampled_ns,
         es=times.sampled_error_us,
     )
+    if header.s != message.src:
+        header.v = message.src
     if message.series != message.topic_id:
         header.sr = message.series
     if age_s is not None:

@@ -32,7 +32,7 @@ def gateway(
     ] = False,
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
-    """Put what the daemon's robots send on Zenoh, and send them what `fleet.down` allows."""
+    """Put what the daemon's robots send on Zenoh, and send them what `[fleet]` allows."""
     if version:
         typer.echo(f"sdrlink-gateway {__version__}")
         return

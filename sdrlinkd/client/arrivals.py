@@ -20,7 +20,7 @@ class Arrivals:
         """Subscriptions that request the kept messages under each filter."""
         self._first: list[Message] = []
         self._ready: deque[Message] = deque()
-        self._newest: dict[str, tuple[int, int]] = {}
+        self._newest: dict[tuple[str, int | None], tuple[int, int]] = {}
         """Number and time of reception of the newest message, by topic."""
 
     @property
@@ -36,8 +36,8 @@ class Arrivals:
 
     def forget(self, filter_: bytes) -> None:
         """Forget which messages under a filter have come."""
-        for topic in [each for each in self._newest if f"{each}\0".encode().startswith(filter_)]:
-            del self._newest[topic]
+        for key in [key for key in self._newest if f"{key[0]}\0".encode().startswith(filter_)]:
+            del self._newest[key]
 
     def take(self, frames: Sequence[bytes]) -> Message | None:
         """The message in `frames`, or None; it may have to wait for kept ones of its topic."""
@@ -67,10 +67,11 @@ class Arrivals:
         # The numbers of a topic rise; stop messages, which have none, stay where they came.
         numbered = sorted((each for each in self._first if each.number), key=_order)
         stops = [each for each in self._first if not each.number]
-        seen = set[tuple[str, int]]()
+        seen = set[tuple[str, int | None, int]]()
         for message in numbered:
-            if (message.topic, message.number) not in seen and not self._is_known(message):
-                seen.add((message.topic, message.number))
+            named = (message.topic, message.via, message.number)
+            if named not in seen and not self._is_known(message):
+                seen.add(named)
                 self._note(message)
                 self._ready.append(message)
         self._ready.extend(stops)
@@ -94,7 +95,7 @@ class Arrivals:
         return message
 
     def _is_known(self, message: Message) -> bool:
-        number, received_ns = self._newest.get(message.topic, (0, 0))
+        number, received_ns = self._newest.get((message.topic, message.via), (0, 0))
         return message.number <= number and message.received_ns <= received_ns
 
     def _decode(self, frames: Sequence[bytes]) -> Message | None:
@@ -107,7 +108,7 @@ class Arrivals:
 
     def _note(self, message: Message) -> None:
         if message.number:
-            self._newest[message.topic] = (message.number, message.received_ns)
+            self._newest[message.topic, message.via] = (message.number, message.received_ns)
 
 
 def _order(message: Message) -> tuple[int, bool]:

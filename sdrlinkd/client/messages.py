@@ -41,7 +41,8 @@ class Message:
     before this subscriber subscribed, and kept for it; `age_us` is its age when it was handed over.
     `series` tells apart the messages of several producers of one declared topic; it is 0 for the
     first producer, and for topics of the registry. `name` tells the message from others at all
-    robots that hear it; stop messages have none.
+    robots that hear it; stop messages have none. `via` is the robot of the gateway that sent the
+    message for `source`, which is on another air; None if `source` sent it itself.
     """
 
     topic: str
@@ -65,6 +66,7 @@ class Message:
     is_late: bool = False
     series: int = 0
     name: MessageName | None = None
+    via: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +139,7 @@ def decode_in(frames: Sequence[bytes]) -> Message | None:
         is_late=fields.get("late", False),
         series=fields.get("sr", 0),
         name=name_in(fields),
+        via=fields.get("v"),
     )
 
 

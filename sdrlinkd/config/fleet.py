@@ -29,5 +29,9 @@ class FleetParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Patterns of the topics of robots that are put on Zenoh; []: all."""
     down: list[str] = []
     """Patterns of the topics that operators may send to robots; needs TLS or access control."""
+    bridge: list[str] = []
+    """Patterns of the topics that this gateway's daemon sends to its robots for robots that only
+    other gateways hear, so that both are one team; needs `auto = true`, and TLS or access
+    control."""
     lease_s: Annotated[float, Meta(ge=0.5, le=60)] = 1.0
     """Time in s after which another gateway takes over from one that is silent."""

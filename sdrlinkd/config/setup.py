@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from zstandard import ZstdCompressionDict
@@ -28,11 +29,14 @@ from sdrlinkd.config.topics import (
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import Qos, TopicPolicy, check_access, flush_told
 from sdrlinkd.wire import (
+    BROADCAST,
     Registry,
     equal_payload,
     is_topic_name,
     max_large_size,
     max_message_size,
+    name_for,
+    read_origin,
 )
 
 MIN_BEACON_S = 0.01
@@ -81,13 +85,36 @@ class Setup:
         return self.republished(src, topic.name if topic else str(topic_id))
 
     def republished(self, src: int, name: str) -> str:
-        """The bus topic under which messages of topic `name` from robot `src` appear."""
+        """The bus topic under which messages of topic `name` from robot `src` appear.
+
+        Those that it sends for another robot appear as that robot's.
+        """
+        origin = read_origin(name)
+        src, name = (src if origin.robot is None else origin.robot), origin.name
         return _PLACEHOLDER.sub(str(src), self.config.rx_format).rstrip("/") + "/" + name
 
     def name_on_air(self, name: str) -> str:
-        """The name of a bus topic on the air: without this robot's namespace."""
+        """The name of a bus topic on the air: without this robot's namespace.
+
+        Where another robot's messages appear, it is the name of that robot's topic.
+        """
+        if (found := self._received.fullmatch(name)) and int(found[1]) < BROADCAST:
+            return name_for(int(found[1]), found[2])
         prefix = f"/{self.config.namespace.strip('/')}/"
         return name.removeprefix(prefix).removeprefix("/")
+
+    def name_on_bus(self, name: str) -> str:
+        """The bus topic of this robot's topic `name` on the air."""
+        namespace = self.config.namespace.strip("/")
+        return f"/{namespace}/{name}" if namespace else f"/{name}"
+
+    @cached_property
+    def _received(self) -> re.Pattern[str]:
+        """What bus topics look like under which other robots' messages appear."""
+        # split() also gives what the placeholders' group matched.
+        before, *rest = map(re.escape, _PLACEHOLDER.split(self.config.rx_format.rstrip("/"))[::2])
+        robot = "(0|[1-9][0-9]{0,2})"
+        return re.compile(before + robot + r"\1".join(rest) + "/(.+)")
 
     @property
     def largest(self) -> int:
@@ -164,6 +191,11 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
         )
     check_relay(config, registry)
     check_security(config, registry)
+    if config.fleet.bridge and not has_numbers:
+        raise ConfigError(
+            f"fleet.bridge: got {config.fleet.bridge}; it needs topics beyond the registry "
+            "(auto = true at all robots); allowed here: []"
+        )
     if config.chrony.socket and config.chrony.robot == node_id:
         raise ConfigError(
             f"chrony.robot: got {node_id}, this robot itself; allowed: another robot, "

@@ -3,8 +3,9 @@
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -13,7 +14,7 @@ from sdrlinkd.config import Setup
 from sdrlinkd.daemon_side import DaemonSide
 from sdrlinkd.errors import ungrouped
 from sdrlinkd.fleet.alarm import Alarm
-from sdrlinkd.fleet.commands import Order
+from sdrlinkd.fleet.bridge import Bridge
 from sdrlinkd.fleet.downward import DownwardCommands
 from sdrlinkd.fleet.election import Election, score
 from sdrlinkd.fleet.formats import encode, read_claim
@@ -21,7 +22,7 @@ from sdrlinkd.fleet.forwarding import Forwarding
 from sdrlinkd.fleet.heard_robot import HeardRobot
 from sdrlinkd.fleet.keys import Keys
 from sdrlinkd.fleet.other_gateways import OtherGateways
-from sdrlinkd.fleet.report import DOWN, UP, Counts, GatewayReport, RobotHeard
+from sdrlinkd.fleet.report import BRIDGE, DOWN, UP, Counts, GatewayReport
 from sdrlinkd.fleet.session import Answer, Sample, Session, open_session
 from sdrlinkd.fleet.upward import SETTLED_S, UpwardMessages
 from sdrlinkd.reports import NeighborReport, Snapshot
@@ -61,7 +62,17 @@ class Gateway:
             params.down,
             session,
             self._counts,
-            self._bus_name,
+            setup.name_on_bus,
+            self._daemon.declare,
+        )
+        self._bridge = Bridge(
+            self._keys,
+            params.bridge,
+            session,
+            self._counts,
+            lambda: not self._others.has_bridge_before(self._is_near),
+            self._is_near,
+            setup.republished,
             self._daemon.declare,
         )
         self._alarm = Alarm(self._do_due)
@@ -75,15 +86,20 @@ class Gateway:
         session.subscribe(keys.all_sent, lambda each: self._down.told(each, _now()))
         session.watch(keys.gateways, self._note_token)
         session.token(keys.gateway(self._own_id))
-        self._serve("status", self._status)
+        self._serve("status", lambda: msgspec.json.encode(self._daemon.snapshot))
         self._serve("heard", self._heard)
-        self._serve("gateway", self._told)
+        self._serve("gateway", lambda: msgspec.json.encode(self.report()))
+        if self._setup.config.fleet.bridge:
+            session.subscribe(keys.all_messages, lambda each: self._bridge.take(each, _now()))
+            session.token(keys.bridges(self._own_id))
         async with asyncio.TaskGroup() as group:
             group.create_task(self._daemon.listen(self._take))
             group.create_task(self._daemon.look(self._see))
             group.create_task(self._tick())
             if self._setup.config.fleet.down:
                 group.create_task(self._down.follow(self._directory))
+            if self._setup.config.fleet.bridge:
+                group.create_task(self._bridge.run(self._directory))
 
     def report(self) -> GatewayReport:
         """The gateway at this moment."""
@@ -94,22 +110,14 @@ class Gateway:
             is_reached=self._session.is_reached,
             has_daemon=self._daemon.snapshot is not None,
             others=self._others.ids,
-            robots=[
-                RobotHeard(
-                    robot=robot.id,
-                    leader=robot.election.leader,
-                    score=robot.election.score,
-                    hold_ms=1e3 * robot.forwarding.hold_s,
-                    put_for_others=robot.forwarding.put_for_others,
-                    put_twice=robot.forwarding.put_twice,
-                )
-                for robot in self._robots.values()
-            ],
+            robots=[each.report() for each in self._robots.values()],
             up=counts.of(UP),
             up_taken=counts["up_taken"],
             up_again=counts["up_again"],
             down=counts.of(DOWN),
             down_taken=counts["down_taken"],
+            bridge=counts.of(BRIDGE),
+            bridge_taken=counts["bridge_taken"],
             puts_failed=self._session.failed,
             samples_dropped=self._session.overrun,
             queries_refused=self._session.queries_refused,
@@ -118,6 +126,11 @@ class Gateway:
     def _take(self, message: Message) -> None:
         prefix = self._setup.republished(message.source, "")
         if message.source == self._own_id or not message.topic.startswith(prefix):
+            return
+        if message.via is not None:
+            # Its own gateway puts it. That nobody else does so makes loops impossible.
+            self._counts.add("up_taken")
+            self._counts.add("up_bridged")
             return
         now, topic = _now(), message.topic.removeprefix(prefix)
         qos = self._classes.get(topic, "default")
@@ -151,7 +164,7 @@ class Gateway:
         if self._setup.config.fleet.down:
             order = self._down.take(sample, known.election.score, now, leads=known.election.leads)
             if order is not None:
-                self._spawn(order)
+                self._spawn(self._down.send(order, now))
         self._set_alarm()
 
     def _claimed(self, sample: Sample) -> None:
@@ -161,14 +174,14 @@ class Gateway:
             known.election.claimed(claim, _now())
 
     def _note_token(self, key: str, is_there: bool) -> None:
-        told = self._keys.read_hears(key)
-        if told is None or told[0] == self._own_id:
+        token = self._keys.read_token(key)
+        if token is None or token.gateway == self._own_id:
             return
-        gateway, robot = told
-        self._others.note(gateway, robot, is_there=is_there)
-        if robot is None:
+        gateway, robot, bridges = token
+        self._others.note(token, is_there=is_there)
+        if token.is_there:
             _log.info("gateway %d %s", gateway, "is there" if is_there else "has gone")
-        if not is_there:
+        if not is_there and not bridges:
             now = _now()
             for each in self._robots.values() if robot is None else [self._robots.get(robot)]:
                 if each is not None:
@@ -186,6 +199,8 @@ class Gateway:
             return
         _log.info("joined fleet %s as gateway %d", self._fleet, self._own_id)
         self._up.reach(_now())
+        if self._setup.config.fleet.bridge:
+            self._spawn(self._bridge.ask())
         loop = asyncio.get_running_loop()
         loop.call_later(SETTLED_S, lambda: self._put_again(are_led=True))
         loop.call_later(SETTLED_S + OTHERS_S, lambda: self._put_again(are_led=False))
@@ -250,28 +265,23 @@ class Gateway:
         for robot in self._robots.values():
             self._up.put_due(robot, now)
         for order in self._down.take_due(now):
-            self._spawn(order)
+            self._spawn(self._down.send(order, now))
         self._set_alarm()
 
-    def _spawn(self, order: Order) -> None:
-        task = asyncio.get_running_loop().create_task(self._down.send(order, _now()))
+    def _spawn(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
         self._sending.add(task)
         task.add_done_callback(self._sending.discard)
 
-    def _bus_name(self, topic: str) -> str:
-        namespace = self._setup.config.namespace.strip("/")
-        return f"/{namespace}/{topic}" if namespace else f"/{topic}"
-
-    def _status(self) -> bytes:
-        return msgspec.json.encode(self._daemon.snapshot)
+    def _is_near(self, robot: int) -> bool:
+        """Whether a robot is on the air of this gateway's daemon."""
+        known = self._robots.get(robot)
+        return robot == self._own_id or (known is not None and known.election.score is not None)
 
     def _heard(self) -> bytes:
         snapshot = self._daemon.snapshot
         neighbors = [] if snapshot is None else snapshot.link.neighbors
         return msgspec.json.encode([each for each in neighbors if not each.is_self])
-
-    def _told(self) -> bytes:
-        return msgspec.json.encode(self.report())
 
 
 def _now() -> float:

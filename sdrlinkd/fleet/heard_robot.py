@@ -7,6 +7,7 @@ from typing import NamedTuple
 from sdrlinkd.fleet.election import Election
 from sdrlinkd.fleet.formats import Passed
 from sdrlinkd.fleet.forwarding import Forwarding
+from sdrlinkd.fleet.report import RobotHeard
 
 
 class Upward(NamedTuple):
@@ -29,3 +30,14 @@ class HeardRobot:
     heard_at: float
     ends: list[Callable[[], None]] = field(default_factory=list)
     """Take down what was declared on Zenoh for this robot."""
+
+    def report(self) -> RobotHeard:
+        """The robot at this moment."""
+        return RobotHeard(
+            robot=self.id,
+            leader=self.election.leader,
+            score=self.election.score,
+            hold_ms=1e3 * self.forwarding.hold_s,
+            put_for_others=self.forwarding.put_for_others,
+            put_twice=self.forwarding.put_twice,
+        )

@@ -8,6 +8,7 @@ ROOT = "sdrlink"
 _ROBOT = re.compile(r"robot_(0|[1-9][0-9]{0,2})\Z")
 MOST_ROBOTS = 254
 _MOST_DIGITS = 3
+_BRIDGE = "bridge"
 
 
 class TopicKey(NamedTuple):
@@ -15,6 +16,19 @@ class TopicKey(NamedTuple):
 
     robot: int
     topic: str
+
+
+class Token(NamedTuple):
+    """That a gateway is there; or that it hears a robot, or bridges."""
+
+    gateway: int
+    robot: int | None = None
+    bridges: bool = False
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it says no more than that the gateway is there."""
+        return self.robot is None and not self.bridges
 
 
 class Keys:
@@ -55,6 +69,10 @@ class Keys:
         """Of the token that a gateway hears a robot."""
         return self.gateway(gateway, f"robot_{robot}")
 
+    def bridges(self, gateway: int) -> str:
+        """Of the token that a gateway sends to its robots what others put."""
+        return self.gateway(gateway, _BRIDGE)
+
     def route(self, robot: int) -> str:
         """Of the gateways' claims to a robot."""
         return f"{self.prefix}/@route/robot_{robot}"
@@ -93,14 +111,14 @@ class Keys:
         is_one = not prefix and what and gateway.isdecimal() and len(gateway) <= _MOST_DIGITS
         return int(gateway) if is_one else None
 
-    def read_hears(self, key: str) -> tuple[int, int | None] | None:
-        """(gateway, robot that it hears or None) in the key of a token; None for any other key."""
+    def read_token(self, key: str) -> Token | None:
+        """What a token says by its key; None for any other key."""
         prefix, _, rest = key.partition(f"{self.prefix}/@gw/")
-        gateway, _, robot = rest.partition("/")
+        gateway, _, told = rest.partition("/")
         if prefix or not gateway.isdecimal() or len(gateway) > _MOST_DIGITS:
             return None
-        number = _robot(robot)
-        return None if robot and number is None else (int(gateway), number)
+        token = Token(int(gateway), _robot(told), bridges=told == _BRIDGE)
+        return None if told and token.is_there else token
 
 
 def _robot(chunk: str) -> int | None:

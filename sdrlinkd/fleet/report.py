@@ -5,12 +5,13 @@ from collections import Counter
 import msgspec
 
 UP = (
-    "up_put", "up_left", "up_held", "up_repeated", "up_not_selected", "up_away", "up_overflow",
+    "up_put", "up_left", "up_held", "up_repeated", "up_bridged", "up_not_selected", "up_away",
+    "up_overflow",
 )  # fmt: skip
 """Ends of messages from robots: put on Zenoh; left to another gateway, which put them; held, as it
-is not known yet whether another one puts them; handed over by the daemon once more; of topics that
-`fleet.up` does not name; not put as no other Zenoh node was reached; not put as too many puts
-waited.
+is not known yet whether another one puts them; handed over by the daemon once more; sent by a
+gateway for a robot on another air; of topics that `fleet.up` does not name; not put as no other
+Zenoh node was reached; not put as too many puts waited.
 """
 DOWN = (
     "down_sent", "down_left", "down_outdated", "down_again", "down_not_allowed",
@@ -18,6 +19,15 @@ DOWN = (
 )  # fmt: skip
 """Ends of commands to robots: handed to the daemon; left to another gateway, at least so far; not
 sent, for the reason in the name (fleet document, 5).
+"""
+BRIDGE = (
+    "bridge_sent", "bridge_near", "bridge_left", "bridge_not_allowed", "bridge_repeated",
+    "bridge_stop", "bridge_waiting", "bridge_overflow", "bridge_refused", "bridge_no_daemon",
+)  # fmt: skip
+"""Ends of messages that other gateways put: handed to the daemon; not sent, as the robot is on this
+air itself; left to another gateway of this air; of topics that `fleet.bridge` does not name; known;
+stop messages, which each robot makes itself; waiting for the daemon; too old when others waited;
+refused by the daemon; lost as it was away.
 """
 
 
@@ -63,6 +73,10 @@ class GatewayReport(msgspec.Struct, frozen=True, kw_only=True):
     """Commands to robots by their end; they add up to `down_taken`."""
     down_taken: int
     """Commands to robots."""
+    bridge: dict[str, int]
+    """Messages that other gateways put by their end; they add up to `bridge_taken`."""
+    bridge_taken: int
+    """Messages that other gateways put, with a `fleet.bridge`."""
     puts_failed: int
     """Puts that Zenoh refused."""
     samples_dropped: int
@@ -78,7 +92,7 @@ class Counts:
         self._counts: Counter[str] = Counter()
 
     def add(self, name: str, n: int = 1) -> None:
-        """Count `n` more under a name of UP or DOWN, or under up_taken, up_again or down_taken."""
+        """Count `n` more under a name of UP, DOWN or BRIDGE, or under one of those of a sum."""
         self._counts[name] += n
 
     def move(self, name: str, to: str) -> None:

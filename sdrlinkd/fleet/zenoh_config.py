@@ -39,8 +39,9 @@ def make_zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
     # `open_session` tries again by itself, as a thread that waits in Zenoh cannot be stopped.
     config.insert_json5("connect/timeout_ms", "0")
     config.insert_json5("connect/retry", json.dumps(RETRY))
-    if params.down:
-        _check_guard(config)
+    for key in ("down", "bridge"):
+        if getattr(params, key):
+            _check_guard(config, key)
     return config
 
 
@@ -50,7 +51,7 @@ def _says_where(config: zenoh.Config) -> bool:
     return any(config.get_json(key) != plain.get_json(key) for key in keys)
 
 
-def _check_guard(config: zenoh.Config) -> None:
+def _check_guard(config: zenoh.Config, key: str) -> None:
     """Refuse to send to robots what anybody on the network may have put. Raises ConfigError."""
     if json.loads(config.get_json("access_control")).get("enabled"):
         return
@@ -58,9 +59,9 @@ def _check_guard(config: zenoh.Config) -> None:
     open_ones = [each for each in given if each.split("/")[0] not in SAFE_PROTOCOLS]
     if open_ones or not given:
         raise ConfigError(
-            f'fleet.down sends to robots what others put on Zenoh, and "{(open_ones or ["…"])[0]}" '
-            "is open to everybody on the network; use tls/ endpoints, or switch on access control "
-            "in the file that fleet.zenoh names"
+            f"fleet.{key} sends to robots what others put on Zenoh, and "
+            f'"{(open_ones or ["…"])[0]}" is open to everybody on the network; use tls/ '
+            "endpoints, or switch on access control in the file that fleet.zenoh names"
         )
 
 

@@ -105,6 +105,7 @@ from sdrlinkd.wire.later import (
     postponed,
     with_seq,
 )
+from sdrlinkd.wire.origin import TopicOrigin, name_for, read_origin
 from sdrlinkd.wire.partials import Lost, Partial, ReassemblyLimits
 from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse, source_and_class
 from sdrlinkd.wire.readable import ControlEntries, numbered, read_control_entries, with_topic
@@ -308,6 +309,7 @@ __all__ = [
     "Sealed",
     "Stamp",
     "Topic",
+    "TopicOrigin",
     "TopicPiece",
     "Waits",
     "Want",
@@ -341,6 +343,7 @@ __all__ = [
     "max_large_size",
     "max_message_size",
     "max_size",
+    "name_for",
     "nearest_number",
     "needs",
     "numbered",
@@ -357,6 +360,7 @@ __all__ = [
     "pieces",
     "postponed",
     "read_control_entries",
+    "read_origin",
     "relayed",
     "share_of",
     "source_and_class",

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire.capacity import MAX_FRAGMENTS, equal_payload
+from sdrlinkd.wire.origin import read_origin
 from sdrlinkd.wire.registry import DECLARED_TOPIC_ID, is_topic_name, topic_type
 
 FIRST_NUMBER = 16
@@ -153,7 +154,7 @@ def parse_description(octets: bytes, check: int) -> Description:
         raise PduError("rx_control_bad", "the pieces of a TOPIC do not belong together")
     flags, depth, hash_ = _ABOUT.unpack_from(octets)
     name, _, kind = octets[_ABOUT.size :].decode(errors="replace").partition("\0")
-    if not is_topic_name(name) or len(name) > MAX_NAME:
+    if not is_topic_name(read_origin(name).name) or len(name) > MAX_NAME:
         raise PduError("rx_control_bad", f"{name[:MAX_NAME]!r} is no topic name")
     known = topic_type(kind)
     if known is None or len(kind) > MAX_NAME:

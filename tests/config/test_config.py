@@ -273,3 +273,23 @@ def test_text_stays_text_where_no_quantity_is_wanted():
     assert parse_config('[soapy]\nsettings = { a_s = "5 ms" }').soapy.settings == {"a_s": "5 ms"}
     with pytest.raises(ConfigError, match=r"from 32 to 2047$"):
         parse_config('[link]\npdu_size = "64 ms"')
+
+
+@pytest.mark.parametrize(
+    "form", ["/rx_robot_{src_id}", "/a/r{src}/b/", "/r{src_id}/from_{src_id}"]
+)  # fmt: skip
+def test_where_another_robots_messages_appear_is_the_name_of_its_topic(form):
+    setup = make_setup(Config(namespace="robot_7", rx_format=form), ETC)
+    for robot in (0, 1, 254):
+        there = setup.republished(robot, "camera/image")
+        assert setup.name_on_air(there) == f"@{robot}/camera/image"
+        assert setup.republished(8, f"@{robot}/camera/image") == there
+    assert setup.name_on_air(setup.republished(255, "odom")) == setup.republished(255, "odom")[1:]
+    assert setup.name_on_air("/robot_7/odom") == "odom"
+    assert setup.name_on_bus("odom") == "/robot_7/odom"
+
+
+def test_a_bridge_needs_declared_topics():
+    text = 'auto = false\n[fleet]\nbridge = ["odom"]'
+    with pytest.raises(ConfigError, match=r"fleet\.bridge: got \['odom'\]; it needs"):
+        make_setup(parse_config(text), ETC)

@@ -33,8 +33,9 @@ def test_keys_are_those_of_the_document():
     assert KEYS.hears(7, 2) == "sdrlink/mine/@gw/7/robot_2"
     assert KEYS.route(2) == "sdrlink/mine/@route/robot_2"
     assert KEYS.sent(2) == "sdrlink/mine/@sent/robot_2"
-    assert KEYS.read_hears("sdrlink/mine/@gw/7") == (7, None)
-    assert KEYS.read_hears("sdrlink/mine/@gw/7/robot_2") == (7, 2)
+    assert KEYS.read_token("sdrlink/mine/@gw/7") == (7, None, False)
+    assert KEYS.read_token("sdrlink/mine/@gw/7/robot_2") == (7, 2, False)
+    assert KEYS.read_token(KEYS.bridges(7)) == (7, None, True)
     assert KEYS.read_robot("sdrlink/mine/@route/robot_2") == 2
 
 
@@ -53,7 +54,7 @@ def test_any_topic_is_one_key_and_is_read_back(robot, topic):
 @law(300)
 @given(st.text() | st.from_regex(r"sdrlink/mine/(@gw|@route|robot_[0-9]+)/.*"))
 def test_any_other_key_is_refused_or_read(key):
-    for read in (KEYS.read_message, KEYS.read_robot, KEYS.read_hears):
+    for read in (KEYS.read_message, KEYS.read_robot, KEYS.read_token):
         read(key)
 
 

@@ -69,6 +69,7 @@ async def test_it_opens_as_soon_as_a_router_is_there(router, tmp_path, caplog):
     [
         ({"down": ["cmd_vel"]}, "tcp/localhost:7447"),
         ({"down": ["cmd_vel"], "connect": ["tls/a:1"], "listen": ["tcp/b:2"]}, "tcp/b:2"),
+        ({"bridge": ["*"], "connect": ["tcp/a:1"]}, "bridge sends to robots what others put"),
         ({"zenoh": "absent.json5"}, "fleet.zenoh: "),
     ],
 )

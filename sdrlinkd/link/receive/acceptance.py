@@ -47,9 +47,12 @@ class Acceptance:
         return any(policy.unproven == "deliver" for policy in policies)
 
     def takes_from(self, topic: HeardTopic, src: int) -> bool:
-        """Whether messages of a topic are taken from robot `src`."""
+        """Whether messages of a topic are taken from robot `src`.
+
+        Where it sends them for another robot, they must be allowed from both.
+        """
         sources = self.policy_of(topic).from_
-        return not sources or src in sources
+        return not sources or {src, topic.origin(src)} <= {*sources}
 
     def takes_unproven(self, topic: HeardTopic) -> bool:
         """Whether messages of a topic are handed over from robots that are not proven."""
@@ -60,7 +63,7 @@ class Acceptance:
         if topic is None:
             return DEFAULT_POLICY
         if topic.about is not None:
-            return self._named.get(topic.name, DEFAULT_POLICY)
+            return self._named.get(topic.at_origin, DEFAULT_POLICY)
         return self._policies.get(topic.base, DEFAULT_POLICY)
 
     def commands(self, topic: HeardTopic | None) -> bool:

@@ -11,6 +11,7 @@ from sdrlinkd.wire import (
     Registry,
     TopicPiece,
     parse_description,
+    read_origin,
 )
 
 MOST_TOLD = 3
@@ -24,6 +25,16 @@ class HeardTopic(NamedTuple):
     name: str
     type: str
     about: Description | None = None
+
+    @property
+    def at_origin(self) -> str:
+        """Its name at the robot whose topic it is."""
+        return read_origin(self.name).name
+
+    def origin(self, src: int) -> int:
+        """The robot whose topic it is, where robot `src` sends it."""
+        robot = read_origin(self.name).robot
+        return src if robot is None else robot
 
 
 @dataclass(slots=True)
@@ -70,7 +81,7 @@ class HeardTopics:
         """
         if topic.about is None:
             return False
-        registered = self._registry.by_name(topic.name)
+        registered = self._registry.by_name(topic.at_origin)
         if registered is not None and registered.type != topic.type:
             return True
         if not any(topic.about.hash_):
@@ -167,7 +178,7 @@ class HeardTopics:
             self.changed.append((src, other))
 
     def _ours(self, topic: HeardTopic) -> str:
-        registered = self._registry.by_name(topic.name)
+        registered = self._registry.by_name(topic.at_origin)
         kind = topic.type if registered is None else registered.type
         return f"{kind} with hash {self._own_hash(kind).hex()}"
 

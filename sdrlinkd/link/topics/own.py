@@ -16,6 +16,7 @@ from sdrlinkd.wire import (
     Topic,
     is_topic_name,
     pieces,
+    read_origin,
     topic_type,
 )
 
@@ -83,7 +84,7 @@ class OwnTopics:
         Raises DeclarationError.
         """
         type_ = topic_type(offer.type)
-        if not is_topic_name(offer.name) or len(offer.name) > MAX_NAME:
+        if not is_topic_name(read_origin(offer.name).name) or len(offer.name) > MAX_NAME:
             raise DeclarationError(
                 f"name: got {offer.name[:MAX_NAME]!r}; allowed: a ROS name such as odom or "
                 f"camera/image, of up to {MAX_NAME} characters"

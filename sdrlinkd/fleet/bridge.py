@@ -1,0 +1,148 @@
+"""Messages of robots on other airs, on their way to the robots on this one."""
+
+import asyncio
+import fnmatch
+import time
+from collections import OrderedDict, deque
+from collections.abc import Awaitable, Callable
+from typing import NamedTuple
+
+from sdrlinkd.client import (
+    AsyncPublisher,
+    MessageName,
+    MessageRefusedError,
+    NoDaemonError,
+    RefusedError,
+)
+from sdrlinkd.fleet.formats import Passed, read_passed
+from sdrlinkd.fleet.keys import Keys, TopicKey
+from sdrlinkd.fleet.names import Duplicates
+from sdrlinkd.fleet.report import Counts
+from sdrlinkd.fleet.session import Sample, Session
+
+LOOK_S = 0.5
+MOST_WAITING = 512
+MOST_WAIT_S = 1.0
+"""Longest time in s that a message waits for a daemon that is busy."""
+ANSWER_S = 2.0
+MOST_REMEMBERED = 4096
+
+
+class _Waiting(NamedTuple):
+    told: TopicKey
+    passed: Passed
+    payload: bytes
+    at: float
+
+
+class Bridge:
+    """Sends what other gateways put through the daemon; times in s of one monotonic clock.
+
+    `sends`: whether this gateway is the one that does so on its air. `is_near`: whether a robot is
+    on this air itself. `bus_name`: the name on the bus of another robot's topic.
+    """
+
+    def __init__(
+        self, keys: Keys, patterns: list[str], session: Session, counts: Counts,
+        sends: Callable[[], bool], is_near: Callable[[int], bool],
+        bus_name: Callable[[int, str], str], declare: Callable[[str, str], Awaitable[None]],
+    ) -> None:  # fmt: skip
+        self._keys = keys
+        self._patterns = patterns
+        self._session = session
+        self._counts = counts
+        self._sends = sends
+        self._is_near = is_near
+        self._bus_name = bus_name
+        self._declare = declare
+        self._duplicates = Duplicates()
+        self._newest: OrderedDict[tuple[str, int], MessageName | None] = OrderedDict()
+        """Name of the last message that was sent, by key and series."""
+        self._waiting: deque[_Waiting] = deque()
+        self._came = asyncio.Event()
+
+    def take(self, sample: Sample, now: float) -> None:
+        """Take what was put at the key of a message, or an answer to a query for it."""
+        told, passed = self._keys.read_message(sample.key), read_passed(sample.attachment)
+        if told is None or passed is None:
+            return
+        self._counts.add("bridge_taken")
+        end = self._end(sample.key, told, passed, now)
+        if end:
+            self._counts.add(end)
+            return
+        self._note((sample.key, passed.sr), passed.name)
+        if len(self._waiting) >= MOST_WAITING:
+            self._waiting.popleft()
+            self._counts.move("bridge_waiting", "bridge_overflow")
+        self._waiting.append(_Waiting(told, passed, sample.payload, now))
+        self._counts.add("bridge_waiting")
+        self._came.set()
+
+    async def ask(self) -> None:
+        """Take the last messages, as far as they are new, since the network is there."""
+        for answer in await self._session.get(self._keys.all_messages, ANSWER_S):
+            self.take(Sample(*answer), time.monotonic())
+
+    async def run(self, directory: str | None) -> None:
+        """Hand what waits to the daemon, forever."""
+        while True:
+            try:
+                async with AsyncPublisher(runtime_dir=directory) as publisher:
+                    while True:
+                        await self._send(publisher)
+            except NoDaemonError:
+                await asyncio.sleep(LOOK_S)
+
+    def _end(self, key: str, told: TopicKey, passed: Passed, now: float) -> str:
+        """Why a message is not sent; empty if it is."""
+        if not any(fnmatch.fnmatchcase(told.topic, pattern) for pattern in self._patterns):
+            return "bridge_not_allowed"
+        if self._is_near(told.robot):
+            return "bridge_near"
+        if not self._sends():
+            return "bridge_left"
+        if passed.stop:
+            return "bridge_stop"
+        series = (key, passed.sr)
+        newest = self._newest.get(series) if passed.again else None
+        if newest is not None and passed.name is not None and newest.matches(passed.name):
+            return "bridge_repeated"
+        return "" if self._duplicates.is_new(series, passed.name, now) else "bridge_repeated"
+
+    def _note(self, series: tuple[str, int], name: MessageName | None) -> None:
+        self._newest[series] = name
+        self._newest.move_to_end(series)
+        if len(self._newest) > MOST_REMEMBERED:
+            self._newest.popitem(last=False)
+
+    async def _send(self, publisher: AsyncPublisher) -> None:
+        """Hand the next message to the daemon. Raises NoDaemonError."""
+        while not self._waiting:
+            self._came.clear()
+            await self._came.wait()
+        (robot, topic), passed, payload, at = self._waiting.popleft()
+        name, end = self._bus_name(robot, topic), "bridge_sent"
+        age_ns = 1_000 * (passed.age or 0) + round(1e9 * (time.monotonic() - at))
+        published_ns = time.time_ns() - age_ns
+
+        async def send() -> None:
+            await publisher.send(
+                name, payload, type=passed.ty or None, key=str(passed.sr) if passed.sr else None,
+                published_ns=published_ns, timeout_s=MOST_WAIT_S,
+            )  # fmt: skip
+
+        try:
+            try:
+                await send()
+            except MessageRefusedError:
+                # A daemon that has started again does not know the topic, either.
+                await self._declare(name, passed.ty)
+                await send()
+        except (MessageRefusedError, RefusedError):
+            end = "bridge_refused"
+        except NoDaemonError:
+            end = "bridge_no_daemon"
+            raise
+        finally:
+            self._counts.move("bridge_waiting", end)
