@@ -1,8 +1,8 @@
 """The wheel `sdrlinkd` needs the wheel `sdrlinkd-client` of the same version.
 
 Both put files into the folder `sdrlinkd` of an environment, and no file is in both: the client's
-wheel has `sdrlinkd/__init__.py` and `sdrlinkd/client`, the daemon's has the rest. A checkout that
-is installed to be edited has all of it.
+wheel has `sdrlinkd/__init__.py`, `sdrlinkd/client` and `sdrlinkd/calls`, the daemon's has the rest.
+A checkout that is installed to be edited has all of it.
 """
 
 from typing import Any

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from sdrlinkd.asking import Asker
 from sdrlinkd.client import (
@@ -61,6 +62,10 @@ class DaemonSide:
             self.snapshot = await self._asker.snapshot()
             see(self.snapshot)
             await asyncio.sleep(POLL_S)
+
+    async def ask(self, verb: str, arguments: dict[str, Any] | None = None) -> Any:  # noqa: ANN401
+        """The daemon's answer to `verb`. Raises RefusedError and NoDaemonError."""
+        return await self._asker.ask(verb, arguments)
 
     async def declare(self, name: str, kind: str) -> None:
         """Declare a topic of type `kind` on the bus. Raises RefusedError and NoDaemonError."""

@@ -136,8 +136,9 @@ class Declaring:
         """The topics that other robots declared, with the bus topics of their messages."""
         return [
             {
-                "robot": src,
-                "name": topic.name,
+                "robot": topic.origin(src),
+                "via": src,
+                "name": topic.at_origin,
                 "type": topic.type,
                 "hash": topic.about.hash_.hex() if topic.about and any(topic.about.hash_) else "",
                 "latched": topic.about.depth if topic.about else 0,

@@ -12,7 +12,7 @@ from sdrlinkd.adapters.recorder import BagWriter
 from sdrlinkd.adapters.robot import BuiltInRobot
 from sdrlinkd.adapters.summary import BagSummary, TopicSummary, summarise
 from sdrlinkd.adapters.transforms import Transforms
-from sdrlinkd.adapters.typestore import definition, empty, from_cdr, knows, to_cdr
+from sdrlinkd.adapters.typestore import definition, empty, from_cdr, knows, to_cdr, type_hash
 
 __all__ = [
     "PLACES",
@@ -45,4 +45,5 @@ __all__ = [
     "read_place",
     "summarise",
     "to_cdr",
+    "type_hash",
 ]

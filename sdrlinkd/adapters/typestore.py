@@ -26,6 +26,11 @@ def definition(kind: str) -> str:
     return ros2_types().generate_msgdef(kind, ros_version=2)[0] if knows(kind) else ""
 
 
+def type_hash(kind: str) -> str:
+    """The RIHS01 hash of `kind`, as in `RIHS01_…`; empty if unknown."""
+    return ros2_types().hash_rihs01(kind) if knows(kind) else ""
+
+
 def to_cdr(message: object, kind: str) -> bytes:
     """A message of `kind` as CDR bytes."""
     return bytes(ros2_types().serialize_cdr(message, kind))

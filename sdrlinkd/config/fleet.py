@@ -33,5 +33,7 @@ class FleetParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Patterns of the topics that this gateway's daemon sends to its robots for robots that only
     other gateways hear, so that both are one team; needs `auto = true`, and TLS or access
     control."""
+    ros_domain: Annotated[int, Meta(ge=0, le=232)] | None = None
+    """ROS domain id in which robots appear to ROS 2 nodes on rmw_zenoh; absent: in none."""
     lease_s: Annotated[float, Meta(ge=0.5, le=60)] = 1.0
     """Time in s after which another gateway takes over from one that is silent."""

@@ -22,7 +22,8 @@ from sdrlinkd.fleet.gateway import run_gateway
 from sdrlinkd.fleet.keys import Keys, TopicKey
 from sdrlinkd.fleet.names import Duplicates
 from sdrlinkd.fleet.report import GatewayReport
-from sdrlinkd.fleet.session import Answer, open_session
+from sdrlinkd.fleet.samples import Answer
+from sdrlinkd.fleet.session import open_session
 from sdrlinkd.fleet.subscriber import FleetClient, FleetMessage
 from sdrlinkd.fleet.zenoh_config import make_zenoh_config
 

@@ -1,7 +1,6 @@
 """Messages of robots on other airs, on their way to the robots on this one."""
 
 import asyncio
-import fnmatch
 import time
 from collections import OrderedDict, deque
 from collections.abc import Awaitable, Callable
@@ -18,7 +17,9 @@ from sdrlinkd.fleet.formats import Passed, read_passed
 from sdrlinkd.fleet.keys import Keys, TopicKey
 from sdrlinkd.fleet.names import Duplicates
 from sdrlinkd.fleet.report import Counts
-from sdrlinkd.fleet.session import Sample, Session
+from sdrlinkd.fleet.samples import Sample
+from sdrlinkd.fleet.session import Session
+from sdrlinkd.fleet.topics import matches
 
 LOOK_S = 0.5
 MOST_WAITING = 512
@@ -96,7 +97,7 @@ class Bridge:
 
     def _end(self, key: str, told: TopicKey, passed: Passed, now: float) -> str:
         """Why a message is not sent; empty if it is."""
-        if not any(fnmatch.fnmatchcase(told.topic, pattern) for pattern in self._patterns):
+        if not matches(told.topic, self._patterns):
             return "bridge_not_allowed"
         if self._is_near(told.robot):
             return "bridge_near"

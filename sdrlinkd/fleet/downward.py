@@ -1,7 +1,6 @@
 """Commands of operators on their way to the daemon, and what became of them."""
 
 import asyncio
-import fnmatch
 import time
 from collections.abc import Awaitable, Callable
 
@@ -13,10 +12,12 @@ from sdrlinkd.client import (
     RefusedError,
 )
 from sdrlinkd.fleet.commands import TAKEN, Commands, Id, Order, Refusal
-from sdrlinkd.fleet.formats import Fate, encode, is_passed, read_command, read_fate
-from sdrlinkd.fleet.keys import Keys
+from sdrlinkd.fleet.formats import Command, Fate, encode, is_passed, read_command, read_fate
+from sdrlinkd.fleet.keys import Keys, TopicKey
 from sdrlinkd.fleet.report import Counts
-from sdrlinkd.fleet.session import Sample, Session
+from sdrlinkd.fleet.samples import Sample
+from sdrlinkd.fleet.session import Session
+from sdrlinkd.fleet.topics import matches
 
 LOOK_S = 0.5
 MOST_WAIT_S = 1.0
@@ -52,18 +53,29 @@ class DownwardCommands:
         return self._commands.due_at
 
     def take(self, sample: Sample, score: float | None, now: float, *, leads: bool) -> Order | None:
-        """Take a sample put at a robot's key; returns the command to send now, if any.
-
-        `score`: how well this gateway hears the robot; None: not at all.
-        """
+        """Take a sample put at a robot's key, as `take_command` does."""
         told = self._keys.read_message(sample.key)
         if told is None or is_passed(sample.attachment):
             return None
+        command = read_command(sample.attachment)
+        return self.take_command(told, command, sample.payload, score, now, leads=leads)
+
+    def may_send(self, topic: str) -> bool:
+        """Whether messages of a topic may be sent to robots."""
+        return matches(topic, self._patterns)
+
+    def take_command(
+        self, told: TopicKey, command: Command | None, cdr: bytes, score: float | None, now: float,
+        *, leads: bool,
+    ) -> Order | None:  # fmt: skip
+        """Take a command to a robot, None if it cannot be read; returns it if it is sent now.
+
+        `score`: how well this gateway hears the robot; None: not at all.
+        """
         self._counts.add("down_taken")
-        if not any(fnmatch.fnmatchcase(told.topic, pattern) for pattern in self._patterns):
+        if not self.may_send(told.topic):
             self._counts.add("down_not_allowed")
             return None
-        command = read_command(sample.attachment)
         if command is None:
             self._counts.add("down_unreadable")
             return None
@@ -72,7 +84,7 @@ class DownwardCommands:
             return None
         patience_s = BACK_OFF_S * max(0.0, 1 - score)
         taken = self._commands.take(
-            told.robot, told.topic, command, sample.payload, now, patience_s, leads=leads
+            told.robot, told.topic, command, cdr, now, patience_s, leads=leads
         )
         if isinstance(taken, Refusal):
             self._counts.add(taken.value)

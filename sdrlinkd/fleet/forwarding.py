@@ -89,6 +89,10 @@ class Forwarding(Generic[T]):
         self._held.append((now + self.hold_s * (1 + self.rank), known))
         return Turn.LATER
 
+    def is_known(self, key: Hashable, name: MessageName, now: float) -> bool:
+        """Whether a message was heard or passed lately."""
+        return self._known.find((key,), name, now) is not None
+
     def passed(
         self, key: Hashable, name: MessageName | None, now: float, *, by_leader: bool
     ) -> bool:

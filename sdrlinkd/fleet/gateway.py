@@ -16,21 +16,19 @@ from sdrlinkd.errors import ungrouped
 from sdrlinkd.fleet.alarm import Alarm
 from sdrlinkd.fleet.bridge import Bridge
 from sdrlinkd.fleet.downward import DownwardCommands
-from sdrlinkd.fleet.election import Election, score
 from sdrlinkd.fleet.formats import encode, read_claim
-from sdrlinkd.fleet.forwarding import Forwarding
 from sdrlinkd.fleet.heard_robot import HeardRobot
+from sdrlinkd.fleet.heard_robots import HeardRobots
 from sdrlinkd.fleet.keys import Keys
 from sdrlinkd.fleet.other_gateways import OtherGateways
 from sdrlinkd.fleet.report import BRIDGE, DOWN, UP, Counts, GatewayReport
-from sdrlinkd.fleet.session import Answer, Sample, Session, open_session
+from sdrlinkd.fleet.ros import FromRos, RosSide
+from sdrlinkd.fleet.samples import Answer, Sample
+from sdrlinkd.fleet.session import Session, open_session
 from sdrlinkd.fleet.upward import SETTLED_S, UpwardMessages
-from sdrlinkd.reports import NeighborReport, Snapshot
+from sdrlinkd.reports import Snapshot
 
 TICK_S = 0.05
-PRESENT_S = 3.0
-"""Time in s after which a robot that is silent is not heard any more."""
-FORGOTTEN_S = 30.0
 OTHERS_S = 0.2
 """Time in s for which a gateway leaves it to the leaders to put last messages again."""
 
@@ -47,15 +45,17 @@ class Gateway:
         self._directory = setup.config.bus.runtime_dir or None
         self._daemon = DaemonSide(self._directory)
         self._own_id = setup.node_id
-        self._lease_s = params.lease_s
         self._fleet = params.name
         self._keys = Keys(params.name)
-        self._robots: dict[int, HeardRobot] = {}
+        self._robots = HeardRobots(self._own_id, params.lease_s, self._open)
         self._others = OtherGateways(self._own_id)
         self._classes: dict[str, str] = {}
         """Class of each topic, by its name on the air."""
         self._counts = Counts()
-        self._up = UpwardMessages(self._own_id, self._keys, params.up, session, self._counts)
+        self._up = UpwardMessages(
+            self._own_id, self._keys, params.up, session, self._counts,
+            lambda topic: self._classes.get(topic, "default"),
+        )  # fmt: skip
         self._down = DownwardCommands(
             self._own_id,
             self._keys,
@@ -70,11 +70,15 @@ class Gateway:
             params.bridge,
             session,
             self._counts,
-            lambda: not self._others.has_bridge_before(self._is_near),
-            self._is_near,
+            lambda: not self._others.has_bridge_before(self._robots.is_near),
+            self._robots.is_near,
             setup.republished,
             self._daemon.declare,
         )
+        self._ros: RosSide | None = None
+        if params.ros_domain is not None:
+            self._ros = RosSide(session, setup, params.ros_domain, self._daemon.ask)
+            self._up.on_put = self._ros.put
         self._alarm = Alarm(self._do_due)
         self._sending: set[asyncio.Task[None]] = set()
 
@@ -92,12 +96,16 @@ class Gateway:
         if self._setup.config.fleet.bridge:
             session.subscribe(keys.all_messages, lambda each: self._bridge.take(each, _now()))
             session.token(keys.bridges(self._own_id))
+        if self._ros is not None:
+            self._ros.start()
         async with asyncio.TaskGroup() as group:
             group.create_task(self._daemon.listen(self._take))
             group.create_task(self._daemon.look(self._see))
             group.create_task(self._tick())
             if self._setup.config.fleet.down:
                 group.create_task(self._down.follow(self._directory))
+            if self._ros is not None:
+                group.create_task(self._ros.run(self._directory))
             if self._setup.config.fleet.bridge:
                 group.create_task(self._bridge.run(self._directory))
 
@@ -110,7 +118,7 @@ class Gateway:
             is_reached=self._session.is_reached,
             has_daemon=self._daemon.snapshot is not None,
             others=self._others.ids,
-            robots=[each.report() for each in self._robots.values()],
+            robots=[each.report() for each in self._robots],
             up=counts.of(UP),
             up_taken=counts["up_taken"],
             up_again=counts["up_again"],
@@ -118,6 +126,7 @@ class Gateway:
             down_taken=counts["down_taken"],
             bridge=counts.of(BRIDGE),
             bridge_taken=counts["bridge_taken"],
+            calls={} if self._ros is None else dict(self._ros.counts),
             puts_failed=self._session.failed,
             samples_dropped=self._session.overrun,
             queries_refused=self._session.queries_refused,
@@ -133,27 +142,23 @@ class Gateway:
             self._counts.add("up_bridged")
             return
         now, topic = _now(), message.topic.removeprefix(prefix)
-        qos = self._classes.get(topic, "default")
-        robot = self._robot(message.source)
-        robot.heard_at = now
-        self._up.take(robot, topic, qos, message, now)
+        robot = self._robots.heard(message.source, now)
+        self._up.take(robot, topic, message, now)
+        if self._ros is not None:
+            self._ros.hear(robot.id, topic, message, leads=robot.election.leads)
         self._set_alarm()
 
-    def _robot(self, robot: int) -> HeardRobot:
-        known = self._robots.get(robot)
-        if known is None:
-            now = _now()
-            election = Election(self._own_id, self._lease_s, now)
-            known = HeardRobot(robot, election, Forwarding(), now)
-            self._robots[robot] = known
-            key = self._keys.messages(robot)
-            known.ends = [
-                self._session.subscribe(key, lambda each: self._put_by_other(robot, each)),
-                self._session.answer(key, lambda _: self._up.answers(robot, _now())),
-                self._session.token(self._keys.hears(self._own_id, robot)),
-            ]
-            _log.info("robot %d is heard", robot)
-        return known
+    def _open(self, robot: int) -> list[Callable[[], None]]:
+        """Follow on Zenoh what concerns a robot that is heard from now on."""
+        key, session = self._keys.messages(robot), self._session
+        ends = [
+            session.subscribe(key, lambda each: self._put_by_other(robot, each)),
+            session.answer(key, lambda _: self._up.answers(robot, _now())),
+            session.token(self._keys.hears(self._own_id, robot)),
+        ]
+        if self._ros is not None and self._setup.config.fleet.down:
+            ends.append(self._ros.follow(robot, self._take_from_ros))
+        return ends
 
     def _put_by_other(self, robot: int, sample: Sample) -> None:
         known = self._robots.get(robot)
@@ -167,9 +172,18 @@ class Gateway:
                 self._spawn(self._down.send(order, now))
         self._set_alarm()
 
+    def _take_from_ros(self, given: FromRos, cdr: bytes) -> None:
+        known, now = self._robots.get(given.told.robot), _now()
+        if known is not None:
+            score, leads = known.election.score, known.election.leads
+            order = self._down.take_command(*given, cdr, score, now, leads=leads)
+            if order is not None:
+                self._spawn(self._down.send(order, now))
+            self._set_alarm()
+
     def _claimed(self, sample: Sample) -> None:
-        robot, claim = self._keys.read_robot(sample.key), read_claim(sample.payload)
-        known = None if robot is None else self._robots.get(robot)
+        claim = read_claim(sample.payload)
+        known = self._robots.get(self._keys.read_robot(sample.key))
         if known is not None and claim is not None:
             known.election.claimed(claim, _now())
 
@@ -183,7 +197,7 @@ class Gateway:
             _log.info("gateway %d %s", gateway, "is there" if is_there else "has gone")
         if not is_there and not bridges:
             now = _now()
-            for each in self._robots.values() if robot is None else [self._robots.get(robot)]:
+            for each in self._robots if robot is None else [self._robots.get(robot)]:
                 if each is not None:
                     each.election.gone(gateway, now)
                     self._lead(each, now)
@@ -207,7 +221,7 @@ class Gateway:
 
     def _put_again(self, *, are_led: bool) -> None:
         """Put again what was not put while the network was away, first for the robots led."""
-        robots = {each.id for each in self._robots.values() if each.election.leads == are_led}
+        robots = {each.id for each in self._robots if each.election.leads == are_led}
         if self._session.is_reached:
             self._up.put_again(robots, _now())
 
@@ -218,29 +232,15 @@ class Gateway:
                 self._setup.name_on_air(each.name): each.qos for each in snapshot.link.topics
             }
         heard = [] if snapshot is None else snapshot.link.neighbors
-        self._note_heard([each for each in heard if not each.is_self], _now())
-
-    def _note_heard(self, neighbors: list[NeighborReport], now: float) -> None:
-        scores = {
-            each.src: score(each.per if each.per_lately is None else each.per_lately, each.snr_db)
-            for each in neighbors
-            if each.last_heard_s_ago < PRESENT_S
-        }
-        for robot in scores:
-            self._robot(robot).heard_at = now
-        for known in list(self._robots.values()):
-            known.election.hear(scores.get(known.id), now)
-            if now > known.heard_at + FORGOTTEN_S:
-                del self._robots[known.id]
-                for end in known.ends:
-                    end()
-                _log.info("robot %d has not been heard for %d s", known.id, FORGOTTEN_S)
+        self._robots.note([each for each in heard if not each.is_self], _now())
 
     async def _tick(self) -> None:
         while True:
             now = _now()
-            for each in self._robots.values():
+            for each in self._robots:
                 self._lead(each, now)
+            if self._ros is not None:
+                self._ros.lead([each.id for each in self._robots if each.election.leads])
             await asyncio.sleep(TICK_S)
 
     def _lead(self, robot: HeardRobot, now: float) -> None:
@@ -256,13 +256,11 @@ class Gateway:
 
     def _set_alarm(self) -> None:
         """Wake up when something that is held is due."""
-        held = (each.forwarding.due_at for each in self._robots.values())
-        self._alarm.ring_by(min(held, default=self._down.due_at))
-        self._alarm.ring_by(self._down.due_at)
+        self._alarm.ring_by(min(self._robots.due_at, self._down.due_at))
 
     def _do_due(self) -> None:
         now = _now()
-        for robot in self._robots.values():
+        for robot in self._robots:
             self._up.put_due(robot, now)
         for order in self._down.take_due(now):
             self._spawn(self._down.send(order, now))
@@ -272,11 +270,6 @@ class Gateway:
         task = asyncio.get_running_loop().create_task(work)
         self._sending.add(task)
         task.add_done_callback(self._sending.discard)
-
-    def _is_near(self, robot: int) -> bool:
-        """Whether a robot is on the air of this gateway's daemon."""
-        known = self._robots.get(robot)
-        return robot == self._own_id or (known is not None and known.election.score is not None)
 
     def _heard(self) -> bytes:
         snapshot = self._daemon.snapshot

@@ -77,6 +77,8 @@ class GatewayReport(msgspec.Struct, frozen=True, kw_only=True):
     """Messages that other gateways put by their end; they add up to `bridge_taken`."""
     bridge_taken: int
     """Messages that other gateways put, with a `fleet.bridge`."""
+    calls: dict[str, int]
+    """Calls of robots' services by ROS 2 nodes, by how they ended."""
     puts_failed: int
     """Puts that Zenoh refused."""
     samples_dropped: int

@@ -11,13 +11,15 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import zenoh
+import zenoh.ext
 
 from sdrlinkd.config import FleetParams
 from sdrlinkd.errors import UserError
 from sdrlinkd.fleet.putting import Lane
+from sdrlinkd.fleet.samples import Answer, Question, Sample
 from sdrlinkd.fleet.zenoh_config import cause, make_zenoh_config
 
 MOST_WAITING = 8192
@@ -36,22 +38,6 @@ _QOS = {
     "default": (zenoh.Priority.DATA, False, zenoh.CongestionControl.BLOCK),
     "bulk": (zenoh.Priority.BACKGROUND, False, zenoh.CongestionControl.DROP),
 }
-
-
-class Sample(NamedTuple):
-    """What came for a subscription."""
-
-    key: str
-    payload: bytes
-    attachment: bytes | None
-
-
-class Answer(NamedTuple):
-    """An answer to a query."""
-
-    key: str
-    payload: bytes
-    attachment: bytes | None = None
 
 
 class Session:
@@ -80,6 +66,11 @@ class Session:
         )
 
     @property
+    def zid(self) -> str:
+        """The id of the session, as it stands in keys."""
+        return str(self._session.zid())
+
+    @property
     def is_reached(self) -> bool:
         """Whether another Zenoh node is connected."""
         return self._transports > 0
@@ -89,16 +80,41 @@ class Session:
         """Puts that Zenoh refused."""
         return sum(lane.failed for lane in self._lanes.values())
 
-    def put(self, key: str, payload: bytes, attachment: bytes | None, qos: str) -> bool:
+    def put(
+        self, key: str, payload: bytes, attachment: bytes | None, qos: str,
+        encoding: str | None = None,
+    ) -> bool:  # fmt: skip
         """Put a value with the priority of class `qos`; False if too many puts wait."""
         priority, express, congestion = _QOS.get(qos, _QOS["default"])
         lane = "block" if congestion is zenoh.CongestionControl.BLOCK else "drop"
         return self._lanes[lane].offer(
             lambda: self._session.put(
                 key, payload, attachment=attachment, priority=priority, express=express,
-                congestion_control=congestion,
+                congestion_control=congestion, encoding=encoding,
             )
         )  # fmt: skip
+
+    def publisher(
+        self, key: str, qos: str, encoding: str, kept: int
+    ) -> Callable[[bytes, bytes | None], bool]:
+        """What puts values at `key` with the priority of class `qos`.
+
+        With `kept` above 0, subscribers that come later get the last values. What it returns is
+        False if too many puts wait.
+        """
+        if not kept:
+            return lambda payload, attachment: self.put(key, payload, attachment, qos, encoding)
+        priority, express, congestion = _QOS.get(qos, _QOS["default"])
+        publisher = zenoh.ext.declare_advanced_publisher(
+            self._session, key, priority=priority, express=express, congestion_control=congestion,
+            encoding=encoding, cache=zenoh.ext.CacheConfig(max_samples=kept),
+            publisher_detection=True,
+        )  # fmt: skip
+        self._keep(publisher)
+        lane = self._lanes["block" if congestion is zenoh.CongestionControl.BLOCK else "drop"]
+        return lambda payload, attachment: lane.offer(
+            lambda: publisher.put(payload, attachment=attachment)
+        )
 
     def subscribe(self, key: str, take: Callable[[Sample], None]) -> Callable[[], None]:
         """Call `take` for each value that others put at `key`; returns what ends that."""
@@ -107,7 +123,8 @@ class Session:
             if sample.kind != zenoh.SampleKind.PUT:
                 return
             attachment = None if sample.attachment is None else sample.attachment.to_bytes()
-            told = Sample(str(sample.key_expr), sample.payload.to_bytes(), attachment)
+            payload, encoding = sample.payload.to_bytes(), str(sample.encoding)
+            told = Sample(str(sample.key_expr), payload, attachment, encoding)
             self._post(lambda: take(told))
 
         others = zenoh.Locality.REMOTE
@@ -141,6 +158,25 @@ class Session:
             query.drop()  # type: ignore[no-untyped-call]
 
         return self._keep(self._session.declare_queryable(key, asked))
+
+    def serve(self, key: str, take: Callable[[Question], None]) -> Callable[[], None]:
+        """Call `take` with each query at `key`; returns what ends that."""
+
+        def asked(query: zenoh.Query) -> None:
+            def reply(payload: bytes, attachment: bytes | None) -> None:
+                def send() -> None:
+                    query.reply(query.key_expr, payload, attachment=attachment)
+                    query.drop()  # type: ignore[no-untyped-call]
+
+                self._answers.offer(send)
+
+            payload = b"" if query.payload is None else query.payload.to_bytes()
+            attachment = None if query.attachment is None else query.attachment.to_bytes()
+            question = Question(payload, attachment, reply, query.drop)
+            self._post(lambda: take(question))
+
+        # All calls are for this one server, as rmw_zenoh asks those that are complete.
+        return self._keep(self._session.declare_queryable(key, asked, complete=True))
 
     async def get(self, key: str, within_s: float) -> list[Answer]:
         """The answers to a query that come within so many seconds."""

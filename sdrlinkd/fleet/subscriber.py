@@ -13,7 +13,8 @@ from sdrlinkd.config import FleetParams
 from sdrlinkd.fleet.formats import Command, Fate, Passed, Qos, encode, read_fate, read_passed
 from sdrlinkd.fleet.keys import Keys
 from sdrlinkd.fleet.names import Duplicates
-from sdrlinkd.fleet.session import Sample, Session, open_session
+from sdrlinkd.fleet.samples import Sample
+from sdrlinkd.fleet.session import Session, open_session
 
 MOST_WAITING = 4096
 ANSWER_S = 2.0

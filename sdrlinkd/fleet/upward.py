@@ -1,7 +1,6 @@
 """Messages of robots on their way to Zenoh, and the last ones for later."""
 
-import fnmatch
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import inf
 
 import msgspec
@@ -10,10 +9,12 @@ from sdrlinkd.client import Message
 from sdrlinkd.fleet.formats import Passed, encode, read_passed
 from sdrlinkd.fleet.forwarding import Turn
 from sdrlinkd.fleet.heard_robot import HeardRobot, Upward
-from sdrlinkd.fleet.keys import Keys
+from sdrlinkd.fleet.keys import Keys, TopicKey
 from sdrlinkd.fleet.last_values import LastValues
 from sdrlinkd.fleet.report import Counts
-from sdrlinkd.fleet.session import Answer, Sample, Session
+from sdrlinkd.fleet.samples import Answer, Sample
+from sdrlinkd.fleet.session import Session
+from sdrlinkd.fleet.topics import matches
 
 SETTLED_S = 0.7
 """Time in s after which whoever reaches the network again has found its way in it."""
@@ -22,28 +23,35 @@ _NOT_PUT = {Turn.LATER: "up_held", Turn.OTHERS: "up_left", Turn.PAST: "up_repeat
 
 
 class UpwardMessages:
-    """Puts the messages of heard robots; times in s of one monotonic clock."""
+    """Puts the messages of heard robots; times in s of one monotonic clock.
+
+    `patterns`: the topics that are put; none: all. `class_of` gives the class of a topic.
+    """
 
     def __init__(
-        self, own_id: int, keys: Keys, patterns: list[str], session: Session, counts: Counts
-    ) -> None:
+        self, own_id: int, keys: Keys, patterns: list[str], session: Session, counts: Counts,
+        class_of: Callable[[str], str],
+    ) -> None:  # fmt: skip
         self._own_id = own_id
         self._keys = keys
         self._patterns = patterns
         self._session = session
         self._counts = counts
+        self._class_of = class_of
         self._last = LastValues()
         self._missed: set[str] = set()
         """Keys whose last message may not have come to anybody, as the network was away."""
         self._settled_at = -inf
+        self.on_put: Callable[[TopicKey, Upward], None] | None = None
+        """Called with each message once, at the gateway that leads; at any where none does."""
 
-    def take(self, robot: HeardRobot, topic: str, qos: str, message: Message, now: float) -> None:
+    def take(self, robot: HeardRobot, topic: str, message: Message, now: float) -> None:
         """Take a message of a robot from the bus."""
         self._counts.add("up_taken")
-        if self._patterns and not any(fnmatch.fnmatchcase(topic, p) for p in self._patterns):
+        if self._patterns and not matches(topic, self._patterns):
             self._counts.add("up_not_selected")
             return
-        key = self._keys.message(robot.id, topic)
+        key, qos = self._keys.message(robot.id, topic), self._class_of(topic)
         item = Upward(key, message.payload, _passed(self._own_id, message), qos, now)
         if not message.is_stop:
             self._last.keep(key, item.payload, item.passed, now)
@@ -58,7 +66,7 @@ class UpwardMessages:
             (key, message.series), message.name, item, now, leads=robot.election.leads
         )
         if turn is Turn.OURS:
-            self._put(item, now)
+            self._put(robot, item, now)
         else:
             self._counts.add(_NOT_PUT[turn])
 
@@ -70,6 +78,11 @@ class UpwardMessages:
         kept = self._last.get(sample.key) if sample.key in self._missed else None
         if kept is not None and passed.name is not None and kept[1].name == passed.name:
             self._missed.discard(sample.key)
+        if self.on_put is not None and self._is_first(robot, passed, sample.key, now):
+            told = self._keys.read_message(sample.key)
+            if told is not None:
+                qos = self._class_of(told.topic)
+                self.on_put(told, Upward(sample.key, sample.payload, passed, qos, now))
         is_led = passed.gw == robot.election.leader
         key = sample.key, passed.sr
         if robot.forwarding.passed(key, passed.name, now, by_leader=is_led):
@@ -80,7 +93,7 @@ class UpwardMessages:
         due = robot.forwarding.lead() if all_held else robot.forwarding.due(now)
         self._counts.add("up_held", -len(due))
         for item in due:
-            self._put(item, now)
+            self._put(robot, item, now)
 
     def reach(self, now: float) -> None:
         """Note that the network is there again; others may need SETTLED_S to find it, too."""
@@ -105,7 +118,13 @@ class UpwardMessages:
                 payload, passed, at = kept
                 yield Answer(key, payload, encode(_aged(passed, now - at, again=True)))
 
-    def _put(self, item: Upward, now: float) -> None:
+    def _is_first(self, robot: HeardRobot, passed: Passed, key: str, now: float) -> bool:
+        """Whether this gateway leads, and has not had a message that another one puts."""
+        if not robot.election.leads or passed.again or passed.name is None:
+            return False
+        return not robot.forwarding.is_known((key, passed.sr), passed.name, now)
+
+    def _put(self, robot: HeardRobot, item: Upward, now: float) -> None:
         if not self._session.is_reached:
             # It was held when the network went away.
             self._missed.add(item.key)
@@ -114,6 +133,9 @@ class UpwardMessages:
         attachment = encode(_aged(item.passed, now - item.at))
         is_put = self._session.put(item.key, item.payload, attachment, item.qos)
         self._counts.add("up_put" if is_put else "up_overflow")
+        is_ours = robot.election.leads or robot.election.leader is None
+        if self.on_put is not None and is_ours and (told := self._keys.read_message(item.key)):
+            self.on_put(told, item)
 
 
 def _passed(own_id: int, message: Message) -> Passed:

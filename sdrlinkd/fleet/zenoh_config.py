@@ -36,6 +36,9 @@ def make_zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
         }
         for key, value in settings.items():
             config.insert_json5(key, json.dumps(value))
+    if params.ros_domain is not None:
+        # Where values are kept for subscribers that come later, Zenoh needs times.
+        config.insert_json5("timestamping/enabled", "true")
     # `open_session` tries again by itself, as a thread that waits in Zenoh cannot be stopped.
     config.insert_json5("connect/timeout_ms", "0")
     config.insert_json5("connect/retry", json.dumps(RETRY))

@@ -14,7 +14,7 @@ import zmq
 ROOT = Path(__file__).parents[2]
 PROGRAM = Path(__file__).with_name("alone.py")
 VERMIN = Path(sys.executable).with_name("vermin")
-FILES = (ROOT / "sdrlinkd/__init__.py", ROOT / "sdrlinkd/client")
+FILES = (ROOT / "sdrlinkd/__init__.py", ROOT / "sdrlinkd/client", ROOT / "sdrlinkd/calls")
 
 
 def call(*arguments, **options):
@@ -89,7 +89,7 @@ def test_the_wheel_is_the_client_alone(wheel, start_daemon, tmp_path):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         (about,) = (archive.read(name).decode() for name in names if name.endswith("METADATA"))
-    ours = {str(path.relative_to(ROOT)) for path in (ROOT / "sdrlinkd/client").glob("*.py")}
+    ours = {str(path.relative_to(ROOT)) for folder in FILES[1:] for path in folder.glob("*.py")}
     assert {name for name in names if name.endswith(".py")} == {"sdrlinkd/__init__.py", *ours}
     assert [line for line in about.splitlines() if line.startswith("Requires-")] == [
         "Requires-Python: >=3.10", "Requires-Dist: pyzmq>=22.3",

@@ -47,12 +47,13 @@ class Fleet:
         self.gateways = {}
         self.daemons = {}
 
-    def start(self, start_daemon, more):
+    def start(self, start_daemon, more, top=""):
         self.router.start()
         (self.folder / "zenoh.json5").write_text(GUARD)
         for robot in (ROBOT, FIRST, SECOND):
             self.daemons[robot] = start_daemon(
-                f'namespace = "robot_{robot}"\nbackend = "gnuradio"\n{self.air.settings(robot)}'
+                f'{top}namespace = "robot_{robot}"\nbackend = "gnuradio"\n'
+                f"{self.air.settings(robot)}"
                 f'[fleet]\nname = "mine"\nconnect = ["{self.router.endpoint}"]\n'
                 f'zenoh = "{self.folder / "zenoh.json5"}"\n{more}'
             )
@@ -103,12 +104,12 @@ class Fleet:
 
 @pytest.fixture
 def start_fleet(start_daemon, tmp_path):
-    """Starts a fleet; `more` is TOML for the section `[fleet]`."""
+    """Starts a fleet; `more` is TOML for the section `[fleet]`, and `top` stands ahead of all."""
     with contextlib.ExitStack() as stack:
 
-        def start(more=""):
+        def start(more="", top=""):
             fleet = Fleet(tmp_path)
             stack.callback(fleet.close)
-            return fleet.start(start_daemon, more)
+            return fleet.start(start_daemon, more, top)
 
         yield start

@@ -154,9 +154,9 @@ def test_two_airs_are_one_team(islands):
     assert reports[9].up["up_bridged"] == 50
     assert reports[9].bridge["bridge_sent"] == 0
     # What has come over the bridge did not go up again.
-    assert reports[7].up["up_put"] == 70
-    again = sum(each.put_for_others for each in reports[9].robots)
-    assert 50 <= reports[8].up["up_put"] + reports[9].up["up_put"] <= 50 + again
+    assert (reports[7].up_taken, reports[7].up["up_put"]) == (70, 70)
+    assert reports[8].up_taken == 50
+    assert reports[9].up_taken == 50 + reports[9].up["up_bridged"]
 
 
 def test_another_gateway_takes_over_and_the_last_map_comes_late(islands):

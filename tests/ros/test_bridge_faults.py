@@ -7,10 +7,10 @@ import sys
 import time
 
 import pytest
-from sdrlink_ros.packet import Kind, Packet, Status
 
 from benchmarks.environments import BRIDGE
 from sdrlinkd.adapters import empty, to_cdr
+from sdrlinkd.calls import Kind, Packet, Status
 from sdrlinkd.client import Publisher, Subscriber
 from tests.ros.programs import Agent, Bridge, new_domain
 from tests.ros.team import (

@@ -5,9 +5,19 @@ from random import Random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sdrlink_ros.calls import KEPT_S, MOST_TRIES, RESULT_KEPT_S, Answerer, Asker, Key
-from sdrlink_ros.packet import MOST_KEPT, Kind, Packet, Status
 
+from sdrlinkd.calls import (
+    KEPT_S,
+    MOST_KEPT,
+    MOST_TRIES,
+    RESULT_KEPT_S,
+    Answerer,
+    Asker,
+    Key,
+    Kind,
+    Packet,
+    Status,
+)
 from tests.laws import law
 
 STEP_S = 0.02

@@ -6,16 +6,23 @@ from collections.abc import Mapping
 from typing import Any
 
 from sdrlink_ros import qos
-from sdrlink_ros.directory import ACTION, SEND_GOAL, Service
 from sdrlink_ros.kinds import Kind, UnknownTypeError, is_cdr, kind
 from sdrlink_ros.names import Names
 from sdrlink_ros.outgoing import Spec
-from sdrlink_ros.packet import ENCAPSULATION
+from sdrlinkd.calls import (
+    ACTION,
+    FEEDBACK,
+    SEND_GOAL,
+    STATUS,
+    STATUS_TYPE,
+    Service,
+    feedback_type,
+    of_action,
+    with_action,
+)
 from sdrlinkd.client import MAX_KEY_BYTES, Message
 
-FEEDBACK, STATUS = "_sdrlink/feedback", "_sdrlink/status"
 TYPES = {FEEDBACK: "sdrlink_ros/msg/Feedback", STATUS: "sdrlink_ros/msg/Status"}
-STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 MOST_STATUSES = 256
 
 
@@ -37,13 +44,13 @@ def specs(offered: Mapping[str, Service]) -> dict[str, Spec]:
     """
     found = {}
     for name, service in _actions(offered).items():
-        action = service.name.split(ACTION)[0].encode()
-        head = ENCAPSULATION + bytes((len(action),)) + action
+        action = service.name.split(ACTION)[0]
+        head = with_action(action)
         for inner, kind_ in _kinds(service).items():
             topic = _topic(name, inner)
             is_latched = inner == STATUS
             found[topic] = Spec(
-                topic, kind_, f"/{inner}", None, True, is_latched, head, _key(action)
+                topic, kind_, f"/{inner}", None, True, is_latched, head, _key(action.encode())
             )
     return found
 
@@ -71,12 +78,10 @@ class Outlets:
     def publish(self, robot: int, message: Message) -> None:
         """Publish a message of another robot's action."""
         inner = next((each for each in TYPES if message.topic.endswith(f"/{each}")), "")
-        body = message.payload[len(ENCAPSULATION) :]
-        length = body[0] if body else 0
-        name, cdr = body[1 : 1 + length], body[1 + length :]
-        if not name or not inner:
+        found = of_action(message.payload)
+        if found is None or not inner:
             return
-        here = self._names.here(robot, name.decode(errors="replace").lstrip("/"))
+        here, cdr = self._names.here(robot, found.action.lstrip("/")), found.cdr
         if inner == STATUS:
             # It may come before the directory that names the action.
             self._status[here] = cdr
@@ -108,7 +113,7 @@ def _actions(services: Mapping[str, Service]) -> dict[str, Service]:
 def _kinds(service: Service) -> dict[str, Kind]:
     """The types of the topics of an action, of which the service sends goals."""
     try:
-        feedback = kind(service.kind.removesuffix("_SendGoal") + "_FeedbackMessage")
+        feedback = kind(feedback_type(service))
         return {FEEDBACK: feedback, STATUS: kind(STATUS_TYPE)}
     except UnknownTypeError:
         return {}

@@ -23,6 +23,7 @@ from sdrlink_ros.routes import Routes, decide
 from sdrlink_ros.sayings import Sayings
 from sdrlink_ros.services import LOST_S, Services, calls_of
 from sdrlink_ros.state import State
+from sdrlinkd.calls import STATUS
 from sdrlinkd.client import RefusedError, runtime_dir
 
 LOOK_S = 0.25
@@ -187,7 +188,7 @@ class Bridge:
                 self._declared.add(name)
         robots = {each.robot for each in self._sources}
         services.reach(frozenset(each for each in robots if calls_of(each) in self._declared))
-        has_inner = f"/{actions.STATUS}" in self._declared
+        has_inner = f"/{STATUS}" in self._declared
         self._of_actions = actions.specs(found.services) if has_inner else {}
         if services.has_proxies:
             peers = self._daemon.ask("peers") or []

@@ -1,27 +1,11 @@
-"""The services that a robot offers to the others: found on its graph, and told as text."""
+"""The services that a robot offers to the others, as found on its graph."""
 
-import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from sdrlink_ros.graph import BRIDGE, type_hash
 from sdrlink_ros.names import Names, matches
-
-ACTION = "/_action/"
-SEND_GOAL = f"{ACTION}send_goal"
-MOST_TOLD = 200
-MOST_NAME = 200
-"""Longest name of a service, in characters; a packet has an octet for its length."""
-_STRING_HEAD = 8
-"""Octets of encapsulation and length before the text of a std_msgs/String."""
-
-
-class Service(NamedTuple):
-    """A service by its name at its robot, with its type and, if known, the hash of its request."""
-
-    name: str
-    kind: str
-    hash: str
+from sdrlinkd.calls import ACTION, MOST_NAME, Service
 
 
 class Found(NamedTuple):
@@ -64,19 +48,3 @@ def request_hash(node: Any, service: str) -> str:  # noqa: ANN401
     topic = f"rq{service}Request"
     endpoints = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
     return next(filter(None, (type_hash(each) for each in endpoints)), "")
-
-
-def told(services: Iterable[Service]) -> bytes:
-    """Services as a std_msgs/String in CDR."""
-    text = json.dumps([list(each) for each in services], separators=(",", ":")).encode() + b"\0"
-    return b"\0\1\0\0" + len(text).to_bytes(4, "little") + text
-
-
-def understood(cdr: bytes) -> list[Service] | None:
-    """The services in such a message; None if it is none."""
-    try:
-        given = json.loads(cdr[_STRING_HEAD:].rstrip(b"\0").decode())
-        services = [Service(*map(str, each)) for each in given[:MOST_TOLD]]
-    except (ValueError, TypeError):
-        return None
-    return [each for each in services if each.name.startswith("/") and len(each.name) <= MOST_NAME]

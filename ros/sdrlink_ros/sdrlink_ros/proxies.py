@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 from rclpy.serialization import deserialize_message, serialize_message
 
-from sdrlink_ros.calls import Asker, Ended, Sent
-from sdrlink_ros.directory import Service, request_hash
+from sdrlink_ros.directory import request_hash
 from sdrlink_ros.kinds import ServiceKind, service_kind
 from sdrlink_ros.names import Names
-from sdrlink_ros.packet import WORDS, Packet, Status
 from sdrlink_ros.sayings import Sayings
+from sdrlinkd.calls import WORDS, Asker, Ended, Packet, Sent, Service, Status
 
 MOST_PROXIES = 500
 

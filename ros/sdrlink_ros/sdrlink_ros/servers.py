@@ -7,11 +7,9 @@ from typing import Any, NamedTuple
 
 from rclpy.serialization import deserialize_message, serialize_message
 
-from sdrlink_ros.calls import Answerer, Key, Sent
-from sdrlink_ros.directory import Service
 from sdrlink_ros.kinds import ServiceKind, service_kind
-from sdrlink_ros.packet import Packet, Status
 from sdrlink_ros.sayings import Sayings
+from sdrlinkd.calls import Answerer, Key, Packet, Sent, Service, Status
 
 FOUND_S = 3.0
 """Time in s that a client has to find its server."""

@@ -16,20 +16,28 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from sdrlink_ros import actions
-from sdrlink_ros.calls import Sent
-from sdrlink_ros.directory import MOST_TOLD, Service, told, understood
 from sdrlink_ros.names import Names, command_name
 from sdrlink_ros.outlet import Source
-from sdrlink_ros.packet import Kind, Packet
 from sdrlink_ros.proxies import Proxies
 from sdrlink_ros.sayings import Sayings
 from sdrlink_ros.servers import Servers
+from sdrlinkd.calls import (
+    CALL_TYPE,
+    CALLS,
+    DIRECTORY,
+    INNER,
+    MOST_TOLD,
+    TEXT,
+    Kind,
+    Packet,
+    Sent,
+    Service,
+    calls_name,
+    told,
+    understood,
+)
 from sdrlinkd.client import Message, MessageRefusedError, Publisher
 
-DIRECTORY, CALLS = "_sdrlink/services", "_sdrlink/calls"
-CALL_TYPE, TEXT = "sdrlink_ros/msg/Call", "std_msgs/msg/String"
-INNER = "_sdrlink/"
-"""Beginning of the names that bridges use among themselves."""
 BUSY_S, IDLE_S = 0.02, 0.5
 """Longest wait in s of the thread, with and without calls that are not over."""
 LOST_S = 3.0
@@ -254,4 +262,4 @@ class Services:
 
 def calls_of(robot: int) -> str:
     """The bus topic of calls to a robot, and of answers to it."""
-    return f"/{command_name(robot, '/' + CALLS)}"
+    return f"/{calls_name(robot)}"

@@ -1,0 +1,97 @@
+"""Messages of robots as topics of this gateway's node."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from sdrlinkd.adapters import type_hash
+from sdrlinkd.fleet.ros.attachment import Attachment
+from sdrlinkd.fleet.ros.graph import Graph, Opened
+from sdrlinkd.fleet.ros.names import UNKNOWN_HASH, Qos, Role, data_key, dds_type, is_name
+from sdrlinkd.fleet.session import Session
+
+MOST_TOPICS = 2048
+ENCODING = "application/cdr;from=sdrlink-gateway"
+"""Tells other gateways that a message comes from a robot, and is no command to it."""
+Put = Callable[[bytes, bytes], bool]
+
+
+class About(NamedTuple):
+    """What a robot says of its topic; `latched` is the number of messages that are kept.
+
+    `hash` is the beginning of the hash of its type in hex digits; empty: unknown.
+    """
+
+    latched: int = 0
+    is_best_effort: bool = False
+    hash: str = ""
+
+
+@dataclass
+class _Topic:
+    name: str
+    kind: str
+    """As in DDS."""
+    about: About
+    qos: str
+    opened: Opened
+    hash: str
+    """Empty: unknown."""
+    n_put: int = 0
+    puts: dict[str, Put] = field(default_factory=dict)
+    """How to put a message, by the hash."""
+
+
+class Topics:
+    """Puts messages where ROS 2 nodes expect them.
+
+    Where this gateway does not know the hash of a type, it learns it from the subscriptions.
+    """
+
+    def __init__(self, graph: Graph, session: Session) -> None:
+        self._graph = graph
+        self._session = session
+        self._topics: dict[tuple[str, str], _Topic] = {}
+
+    def put(
+        self, name: str, kind: str, payload: bytes, sent_ns: int, qos: str, about: About
+    ) -> None:
+        """Put a message of topic `name` of type `kind`, sent at `sent_ns` in ns since 1970.
+
+        `qos` is the class that sets Zenoh's priority.
+        """
+        topic = self._topics.get((name, kind)) or self._open(name, kind, qos, about)
+        if topic is None:
+            return
+        topic.n_put += 1
+        attachment = Attachment(topic.n_put, sent_ns, topic.opened.gid).build()
+        for hash_ in [topic.hash] if topic.hash else self._learnt(topic):
+            self._put_for(topic, hash_)(payload, attachment)
+
+    def _open(self, name: str, kind: str, qos: str, about: About) -> _Topic | None:
+        dds = dds_type(kind)
+        if not dds or not is_name(name) or len(self._topics) >= MOST_TOPICS:
+            return None
+        hash_ = type_hash(kind)
+        if about.hash and not hash_.removeprefix("RIHS01_").startswith(about.hash):
+            # The robot's type has other fields than the one known here.
+            hash_ = ""
+        depth = about.latched or 10
+        profile = Qos(about.is_best_effort, bool(about.latched), depth)
+        opened = self._graph.open(Role.PUBLISHER, name, dds, hash_ or UNKNOWN_HASH, profile)
+        topic = self._topics[name, kind] = _Topic(name, dds, about, qos, opened, hash_)
+        return topic
+
+    def _learnt(self, topic: _Topic) -> list[str]:
+        beginning = f"RIHS01_{topic.about.hash}"
+        found = self._graph.hashes(topic.name, topic.kind)
+        return [each for each in found if each.startswith(beginning) or not topic.about.hash]
+
+    def _put_for(self, topic: _Topic, hash_: str) -> Put:
+        put = topic.puts.get(hash_)
+        if put is None:
+            key = data_key(self._graph.domain, topic.name, topic.kind, hash_)
+            put = topic.puts[hash_] = self._session.publisher(
+                key, topic.qos, ENCODING, topic.about.latched
+            )
+        return put
