@@ -59,6 +59,8 @@ ROWS = {
             for each in ("pdr", "lost_by", "twice", "added_ms_p50", "added_ms_p99")
         ),
         "hand_over_gap_s", "router_killed_s", "gateway_killed_s",
+        "wan_pdr", "wan_twice", "wan_copies",
+        *(f"wan_late_ms_{each}" for each in ("p50", "p90", "p99")),
         "lost_50_robots", "twice_50_robots", "router_cpu_pct",
         "page_desk_cpu_pct", "page_robot_cpu_pct",
     },

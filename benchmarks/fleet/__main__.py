@@ -4,11 +4,12 @@ import sys
 from collections.abc import Iterator
 
 from benchmarks.absent import attempt
-from benchmarks.fleet import diversity_rows, faults_rows, load_rows, page_rows
+from benchmarks.fleet import diversity_rows, faults_rows, load_rows, page_rows, wan_rows
 from benchmarks.report import Row, main
 
 ROWS = {
     "several gateways": diversity_rows.rows,
+    "a wide-area network": wan_rows.rows,
     "faults": faults_rows.rows,
     "many robots": load_rows.rows,
     "the page": page_rows.rows,

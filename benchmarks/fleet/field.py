@@ -15,7 +15,7 @@ from sdrlinkd.process import Process
 
 ROBOT = 2
 FLEET = "bench"
-ROUTER = "benchmarks.peers.zenoh_router"
+ROUTER, WAN = "benchmarks.peers.zenoh_router", "benchmarks.peers.wan"
 GUARD = (
     '{access_control: {enabled: true, default_permission: "allow", rules: [], subjects: [], '
     "policies: []}}"
@@ -29,6 +29,8 @@ class Field:
 
     air: PduAir
     endpoint: str
+    far_endpoint: str
+    """Where gateways find the router, over the wide-area network."""
     folders: dict[int, Path]
     gateways: dict[int, Process]
     router: Process
@@ -56,21 +58,25 @@ def routed(endpoint: str) -> Iterator[Process]:
 
 
 @contextmanager
-def field(losses: Mapping[int, float], seed: int) -> Iterator[Field]:
+def field(losses: Mapping[int, float], seed: int, wan_ms: float = 0.0) -> Iterator[Field]:
     """Run the robot's daemon, and for each gateway, which loses so much of it, both its programs.
 
-    Raises PeerError.
+    The gateways are `wan_ms` away from the router. Raises PeerError.
     """
     endpoint = free_endpoint()
+    far = free_endpoint() if wan_ms else endpoint
     robots = [ROBOT, *losses]
     with PduAir(robots, seed) as air, ExitStack() as stack:
         guard = stack.enter_context(_file(GUARD))
         fleet = (
-            f'[fleet]\nname = "{FLEET}"\nconnect = ["{endpoint}"]\nzenoh = "{guard}"\n'
+            f'[fleet]\nname = "{FLEET}"\nconnect = ["{far}"]\nzenoh = "{guard}"\n'
             'down = ["cmd_vel"]\n'
         )
         own = {robot: air.settings(robot) + fleet for robot in robots}
         router = stack.enter_context(routed(endpoint))
+        if wan_ms:
+            ports = [each.rpartition(":")[2] for each in (far, endpoint)]
+            processes.start_module(stack, "wan", WAN, *ports, str(wan_ms)).line()
         started = stack.enter_context(
             running("gnuradio", robots, ["odom", "cmd_vel"], "", "", own=own, ready=is_up)
         )
@@ -81,7 +87,7 @@ def field(losses: Mapping[int, float], seed: int) -> Iterator[Field]:
             gateways[gateway] = processes.start_module(
                 stack, f"gateway_{gateway}", "sdrlinkd.cli.gateway", "--config", str(config)
             )
-        yield Field(air, endpoint, started.folders, gateways, router)
+        yield Field(air, endpoint, far, started.folders, gateways, router)
 
 
 @contextmanager
