@@ -1,6 +1,8 @@
 """`demo`: runs the paper's experiment on this machine."""
 
-from contextlib import ExitStack
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -13,9 +15,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from sdrlinkd import __version__
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.compiling import compile_first
+from sdrlinkd.cli.drive import PAGE, write_page
 from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
 from sdrlinkd.cli.page_beside import page_beside
 from sdrlinkd.demo import (
+    NODE_ID,
     DemoReport,
     Options,
     RunResult,
@@ -29,6 +33,8 @@ from sdrlinkd.demo import (
     topic_table,
     verdict,
 )
+from sdrlinkd.drive import RunDrive
+from sdrlinkd.reports import Snapshot
 from sdrlinkd.tables import screen_console
 from sdrlinkd.wire import MAX_PDU_SIZE, MIN_PDU_SIZE
 
@@ -122,9 +128,9 @@ def demo(
     web: Annotated[
         bool, typer.Option("--web", help="Serve the page of the daemons while they run.")
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder for report.json and the pictures.")] = Path(
-        "build/demo"
-    ),
+    out: Annotated[
+        Path, typer.Option(help="Folder for report.json, the pictures and the drives.")
+    ] = Path("build/demo"),
 ) -> None:
     """Send a robot's messages through daemons and radios; repeat the paper's measurements."""
     console = screen_console()
@@ -150,7 +156,7 @@ def demo(
             _say(console, stack.enter_context(page_beside()))
         for kind in kinds:
             options = replace(options, link=kind.value)
-            result, traces[kind.value] = _run(console, source, options)
+            result, traces[kind.value] = _run(console, source, options, out / kind.value)
             results.append(result)
     source.recording.close()
     told = DemoReport(version=__version__, runs=results)
@@ -165,7 +171,8 @@ def demo(
     console.print(table_6(results))
     for result in results:
         _say(console, _summary(result))
-    _say(console, f"wrote {out}/{REPORT}, {', '.join(PICTURES)}")
+    drives = ", ".join(f"{kind.value}/{PAGE}" for kind in kinds)
+    _say(console, f"wrote {out}/{REPORT}, {', '.join(PICTURES)}, {drives}")
     if results[0].damage:
         _say(console, f"warning: {results[0].damage}", style="yellow")
     for result in results:
@@ -190,7 +197,29 @@ def _measure(console: Console, source: Source, options: Options) -> float:
     return found.rate_hz
 
 
-def _run(console: Console, source: Source, options: Options) -> tuple[RunResult, Trace]:
+def _run(
+    console: Console, source: Source, options: Options, folder: Path
+) -> tuple[RunResult, Trace]:
+    """Run one link, and keep its drive in `folder`."""
+    folder.mkdir(exist_ok=True)
+    began, drive, receiver = time.monotonic(), RunDrive(folder, time.time_ns()), NODE_ID
+
+    def see(snapshot: Snapshot) -> None:
+        nonlocal receiver
+        receiver = snapshot.node
+        drive.see([snapshot], time.monotonic() - began)
+
+    with closing(drive):
+        result, trace = _in_sight(console, source, options, see)
+        drive.passed(NODE_ID, receiver, trace, began)
+    write_page(folder, f"Demo over {options.link}: {source.title}")
+    return result, trace
+
+
+def _in_sight(
+    console: Console, source: Source, options: Options, see: Callable[[Snapshot], None]
+) -> tuple[RunResult, Trace]:
+    """Run one link with its progress on the screen."""
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -205,6 +234,7 @@ def _run(console: Console, source: Source, options: Options) -> tuple[RunResult,
             source,
             options,
             lambda sent, received: progress.update(task, completed=sent, received=received),
+            see,
         )
 
 

@@ -17,12 +17,11 @@ from sdrlinkd.cli.drive import PAGE, write_page
 from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
 from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario, scenario_names
 from sdrlinkd.cli.page_beside import page_beside
-from sdrlinkd.drive import DRIVE
+from sdrlinkd.drive import DRIVE, RunDrive
 from sdrlinkd.lab import (
     LabOptions,
     LabReport,
     LabState,
-    RunDrive,
     find_scenario,
     live_table,
     pair_table,

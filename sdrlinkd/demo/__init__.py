@@ -2,7 +2,7 @@
 
 from sdrlinkd.demo.folder import run_folder
 from sdrlinkd.demo.hearing import Hearing
-from sdrlinkd.demo.links import Options, write_config
+from sdrlinkd.demo.links import NODE_ID, Options, write_config
 from sdrlinkd.demo.nodes import daemon_process, problems_of, snapshot_of, wait_until_up
 from sdrlinkd.demo.rate import Found, find_rate
 from sdrlinkd.demo.report import DemoReport, RunResult, TopicResult, latency_ms
@@ -13,6 +13,7 @@ from sdrlinkd.demo.trace import Pair, Sample, Trace
 from sdrlinkd.demo.verdict import is_good, verdict
 
 __all__ = [
+    "NODE_ID",
     "PAPER_TABLE_6",
     "DemoReport",
     "Found",

@@ -20,23 +20,31 @@ QUIET_S = 3.0
 # Time in s for what is still in the receiver, once nothing is in transit.
 SETTLE_S = 0.3
 
+# Least time in s between two reports of a daemon.
+LOOK_S = 0.9
+
 Progress = Callable[[int, int], None]
+See = Callable[[Snapshot], None]
 
 
-def run_demo(source: Source, options: Options, progress: Progress) -> tuple[RunResult, Trace]:
+def run_demo(
+    source: Source, options: Options, progress: Progress, see: See = lambda _snapshot: None
+) -> tuple[RunResult, Trace]:
     """Send `source` through daemons; returns the results, and the trace behind them.
 
-    `progress(sent, received)` is called during the run.
+    `progress(sent, received)` is called during the run, and `see` with reports of the daemons.
     """
     trace = Trace({topic.name: topic.type for topic in source.registry.topics})
     with run_folder() as folder:
         if options.link == "iqfile":
             sent, heard, duration_s, problems = _over_recording(
-                folder, source, options, trace, progress
+                folder, source, options, trace, progress, see
             )
             load = None
         else:
-            sent, duration_s, problems, load = _to_itself(folder, source, options, trace, progress)
+            sent, duration_s, problems, load = _to_itself(
+                folder, source, options, trace, progress, see
+            )
             heard = sent
     tx, rx = sent.link.tx, heard.link.rx
     pdus = {k: v for k, v in rx.pdus_dropped.items() if k not in ("rx_control", "rx_dup")}
@@ -55,31 +63,41 @@ def run_demo(source: Source, options: Options, progress: Progress) -> tuple[RunR
 
 
 def _to_itself(
-    folder: Path, source: Source, options: Options, trace: Trace, progress: Progress
+    folder: Path, source: Source, options: Options, trace: Trace, progress: Progress, see: See
 ) -> tuple[Snapshot, float, list[str], Load]:
     """Run one node that hears itself: (snapshot, duration in s, ledger discrepancies, load)."""
     config = write_config(folder / "node", source, options, "both", folder)
     directory = config.parent
     with daemon(config) as process, Consumer(directory, trace) as consumer:
-        began, load = time.monotonic(), LoadOf(process.pid)
-        _produce(source, options, directory, trace, lambda: progress(trace.n_sent, consumer.count))
-        snapshot = _wait_until_through(
-            directory, consumer, trace.n_sent, lambda: progress(trace.n_sent, consumer.count)
-        )
+        began, load, looks = time.monotonic(), LoadOf(process.pid), _Looks(directory, see)
+
+        def go_on() -> None:
+            progress(trace.n_sent, consumer.count)
+            looks.look()
+
+        _produce(source, options, directory, trace, go_on)
+        snapshot = _wait_until_through(directory, consumer, trace.n_sent, go_on)
+        see(snapshot)
         duration_s = max(consumer.last_at, trace.last_sent_at) - began
         return snapshot, duration_s, problems_of(directory), load.read()
 
 
 def _over_recording(
-    folder: Path, source: Source, options: Options, trace: Trace, progress: Progress
+    folder: Path, source: Source, options: Options, trace: Trace, progress: Progress, see: See
 ) -> tuple[Snapshot, Snapshot, float, list[str]]:
     """Run a node that records, then one that plays: (both snapshots, duration in s, problems)."""
     recording = options.recording or folder / "recording"
     config = write_config(folder / "sender", source, options, "record", recording.absolute())
     with daemon(config):
-        began = time.monotonic()
-        _produce(source, options, config.parent, trace, lambda: progress(trace.n_sent, 0))
+        began, looks = time.monotonic(), _Looks(config.parent, see)
+
+        def go_on() -> None:
+            progress(trace.n_sent, 0)
+            looks.look()
+
+        _produce(source, options, config.parent, trace, go_on)
         sent = _wait_until_sent(config.parent, trace.n_sent)
+        see(sent)
         duration_s = time.monotonic() - began
         problems = problems_of(config.parent)
     config = write_config(folder / "listener", source, options, "play", recording.absolute())
@@ -87,8 +105,25 @@ def _over_recording(
         heard = _wait_until_played(
             config.parent, consumer, lambda: progress(trace.n_sent, consumer.count)
         )
+        see(heard)
         problems += problems_of(config.parent)
     return sent, heard, duration_s, problems
+
+
+class _Looks:
+    """Asks a daemon for its report about once a second."""
+
+    def __init__(self, directory: Path, see: See) -> None:
+        self._directory = directory
+        self._see = see
+        self._next_at = 0.0
+
+    def look(self) -> None:
+        """Ask, if it is time."""
+        now = time.monotonic()
+        if now >= self._next_at:
+            self._next_at = now + LOOK_S
+            self._see(snapshot_of(self._directory))
 
 
 def _produce(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from sdrlinkd.drive.keeping import Chronicle, keep
 from sdrlinkd.drive.names import DRIVE, Event, received, sent
 from sdrlinkd.drive.reading import Drive, read_drive
+from sdrlinkd.drive.run_drive import RunDrive
 from sdrlinkd.drive.writer import DriveWriter
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ __all__ = [
     "Drive",
     "DriveWriter",
     "Event",
+    "RunDrive",
     "keep",
     "read_drive",
     "received",

@@ -1,6 +1,5 @@
 """Many robots on one simulated air: scenarios, their hub, and a run with real daemons."""
 
-from sdrlinkd.lab.drive import RunDrive
 from sdrlinkd.lab.hub import make_hub
 from sdrlinkd.lab.report import LabReport, PairResult, RobotResult
 from sdrlinkd.lab.run import LabOptions, LabState, run_lab
@@ -14,7 +13,6 @@ __all__ = [
     "LabState",
     "PairResult",
     "RobotResult",
-    "RunDrive",
     "Scenario",
     "find_scenario",
     "live_table",

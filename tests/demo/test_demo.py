@@ -7,6 +7,7 @@ import pytest
 from sdrlinkd.cli import run
 from sdrlinkd.demo import Options, open_source, run_demo
 from sdrlinkd.demo.links import write_config
+from sdrlinkd.drive import read_drive
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
 
 
@@ -48,6 +49,16 @@ def test_the_whole_of_table_6(tmp_path, capsys):
         picture = (tmp_path / name).read_bytes()
         assert picture.startswith(b"\x89PNG")
         assert len(picture) > 5000
+    for name, receiver in (("ofdm", 1), ("iqfile", 2), ("direct", 1)):
+        kept = read_drive(tmp_path / name)
+        told = kept.stations[receiver].deliveries
+        assert {topic: each.delivered for (src, topic), each in told.items() if src == 1} == {
+            "/odom": 120, "/imu": 200, "/scan": 40, "/cmd_vel": 40,
+        }  # fmt: skip
+        assert {key: len(path) for key, path in kept.paths.items()} == {
+            (1, None): 120, (1, receiver): 120,
+        }  # fmt: skip
+        assert "Delivery" in (tmp_path / name / "report.html").read_text()
     out = capsys.readouterr().out
     assert "0.01" in out
     assert "228.6" in out

@@ -1,11 +1,13 @@
-"""The drive of a run, as `sdrlinkctl log` would have kept it."""
+"""The drive of a run of `lab` or `demo`, as `sdrlinkctl log` would have kept it."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
 from sdrlinkd.adapters import PLACES
 from sdrlinkd.demo import Sample, Trace
-from sdrlinkd.drive import DRIVE, Chronicle, DriveWriter, received, sent
+from sdrlinkd.drive.keeping import Chronicle
+from sdrlinkd.drive.names import DRIVE, received, sent
+from sdrlinkd.drive.writer import DriveWriter
 from sdrlinkd.reports import Snapshot
 
 SECOND_NS = 1_000_000_000
