@@ -13,7 +13,7 @@ from sdrlinkd.client import (
     NoDaemonError,
 )
 from sdrlinkd.errors import UserError
-from sdrlinkd.reports import Snapshot
+from sdrlinkd.reports import NeighborReport, Snapshot
 
 POLL_S = 0.5
 ANSWER_S = 2.0
@@ -29,6 +29,12 @@ class DaemonSide:
         self._asker = Asker(directory, ANSWER_S)
         self.snapshot: Snapshot | None = None
         """The daemon's last report; None while it does not answer."""
+
+    @property
+    def neighbors(self) -> list[NeighborReport]:
+        """The other robots in its last report."""
+        heard = [] if self.snapshot is None else self.snapshot.link.neighbors
+        return [each for each in heard if not each.is_self]
 
     async def listen(self, take: Callable[[Message], None], topics: Sequence[str] = ()) -> None:
         """Call `take` for each message from the air; waits for the daemon if it is away.

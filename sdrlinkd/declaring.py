@@ -11,7 +11,7 @@ import msgspec
 from sdrlinkd.bus import Bus, shown
 from sdrlinkd.config import TF_TYPE, Setup
 from sdrlinkd.errors import DeclarationError
-from sdrlinkd.link import Link
+from sdrlinkd.link import HeardTopic, Link
 from sdrlinkd.offers import Declaration
 from sdrlinkd.policies import Policies
 from sdrlinkd.wire import read_origin, topic_type
@@ -133,7 +133,16 @@ class Declaring:
         return [self._said] if time.monotonic() - self._said_at < SAID_S else []
 
     def declared(self) -> list[dict[str, Any]]:
-        """The topics that other robots declared, with the bus topics of their messages."""
+        """The topics that other robots declared, with the bus topics of their messages.
+
+        A topic that comes from a robot itself, and over a gateway, is named once, as the robot's.
+        """
+        found: dict[str, tuple[int, HeardTopic]] = {}
+        for src, topics in sorted(self._link.heard_topics().items()):
+            for topic in topics:
+                name = self._setup.republished(src, topic.name)
+                if name not in found or topic.origin(src) == src:
+                    found[name] = src, topic
         return [
             {
                 "robot": topic.origin(src),
@@ -143,8 +152,7 @@ class Declaring:
                 "hash": topic.about.hash_.hex() if topic.about and any(topic.about.hash_) else "",
                 "latched": topic.about.depth if topic.about else 0,
                 "best_effort": bool(topic.about and topic.about.is_best_effort),
-                "topic": self._setup.republished(src, topic.name),
+                "topic": name,
             }
-            for src, topics in sorted(self._link.heard_topics().items())
-            for topic in topics
+            for name, (src, topic) in found.items()
         ]

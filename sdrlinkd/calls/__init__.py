@@ -29,16 +29,27 @@ from sdrlinkd.calls.offered import (
     understood,
     with_action,
 )
-from sdrlinkd.calls.packet import ENCAPSULATION, MOST_KEPT, WORDS, Kind, Packet, Status
+from sdrlinkd.calls.packet import (
+    CANCEL_GOAL,
+    ENCAPSULATION,
+    GET_RESULT,
+    MOST_KEPT,
+    WORDS,
+    Kind,
+    Packet,
+    Status,
+)
 from sdrlinkd.calls.repeats import MOST_TRIES, RESULT_KEPT_S, Sent
 
 __all__ = [
     "ACTION",
     "CALLS",
     "CALL_TYPE",
+    "CANCEL_GOAL",
     "DIRECTORY",
     "ENCAPSULATION",
     "FEEDBACK",
+    "GET_RESULT",
     "INNER",
     "KEPT_S",
     "MOST_KEPT",

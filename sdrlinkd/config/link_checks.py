@@ -1,5 +1,6 @@
 """Checks that the link's sections of the configuration agree with each other."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,6 +10,25 @@ from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import FixedRoutes, Qos, TopicPolicy
 from sdrlinkd.wire import MIN_SEALED_SIZE, Registry
+
+_COMMANDS = re.compile(r"/robot_\{(src_id|src)\}/?")
+
+
+def check_bridge(config: Config, has_numbers: bool) -> None:
+    """Check that topics of robots on other airs can be sent, if they are.
+
+    Raises ConfigError, which begins with the key and says what was given and what is allowed.
+    """
+    if config.fleet.bridge and not has_numbers:
+        raise ConfigError(
+            f"fleet.bridge: got {config.fleet.bridge}; it needs topics beyond the registry "
+            "(auto = true at all robots); allowed here: []"
+        )
+    if config.fleet.bridge and _COMMANDS.fullmatch(config.rx_format):
+        raise ConfigError(
+            f'rx_format: got "{config.rx_format}", the form of commands to robots; allowed with '
+            'fleet.bridge: any other, such as "/rx_robot_{src_id}"'
+        )
 
 
 def check_relay(config: Config, registry: Registry) -> None:

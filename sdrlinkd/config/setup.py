@@ -8,6 +8,7 @@ from pathlib import Path
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.config.link_checks import (
+    check_bridge,
     check_relay,
     check_reserved,
     check_security,
@@ -96,11 +97,13 @@ class Setup:
     def name_on_air(self, name: str) -> str:
         """The name of a bus topic on the air: without this robot's namespace.
 
-        Where another robot's messages appear, it is the name of that robot's topic.
+        At a gateway that bridges, the names of other robots' messages mean these robots' topics.
         """
-        if (found := self._received.fullmatch(name)) and int(found[1]) < BROADCAST:
-            return name_for(int(found[1]), found[2])
         prefix = f"/{self.config.namespace.strip('/')}/"
+        if self.config.fleet.bridge and not name.startswith(prefix):
+            found = self._received.fullmatch(name)
+            if found and int(found[1]) < BROADCAST:
+                return name_for(int(found[1]), found[2])
         return name.removeprefix(prefix).removeprefix("/")
 
     def name_on_bus(self, name: str) -> str:
@@ -191,11 +194,7 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
         )
     check_relay(config, registry)
     check_security(config, registry)
-    if config.fleet.bridge and not has_numbers:
-        raise ConfigError(
-            f"fleet.bridge: got {config.fleet.bridge}; it needs topics beyond the registry "
-            "(auto = true at all robots); allowed here: []"
-        )
+    check_bridge(config, has_numbers)
     if config.chrony.socket and config.chrony.robot == node_id:
         raise ConfigError(
             f"chrony.robot: got {node_id}, this robot itself; allowed: another robot, "

@@ -18,6 +18,7 @@ from sdrlinkd.fleet.report import Counts
 from sdrlinkd.fleet.samples import Sample
 from sdrlinkd.fleet.session import Session
 from sdrlinkd.fleet.topics import matches
+from sdrlinkd.wire import is_topic_name
 
 LOOK_S = 0.5
 MOST_WAIT_S = 1.0
@@ -73,7 +74,7 @@ class DownwardCommands:
         `score`: how well this gateway hears the robot; None: not at all.
         """
         self._counts.add("down_taken")
-        if not self.may_send(told.topic):
+        if not is_topic_name(told.topic) or not self.may_send(told.topic):
             self._counts.add("down_not_allowed")
             return None
         if command is None:

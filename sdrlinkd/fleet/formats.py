@@ -16,6 +16,7 @@ MOST_OCTETS = 1024
 """Largest attachment in octets that is read."""
 Gateway = Annotated[int, Meta(ge=0, le=254)]
 Number = Annotated[int, Meta(ge=0, le=1 << 53)]
+Time = Annotated[int, Meta(ge=0, le=(1 << 63) - 1)]
 Text = Annotated[str, Meta(max_length=128)]
 Qos = Literal["", "urgent", "latency", "default", "bulk"]
 """A class; empty: that of the topic."""
@@ -33,7 +34,7 @@ class Passed(msgspec.Struct, frozen=True, omit_defaults=True):
     ps: Number = 0
     sr: Number = 0
     age: Number | None = None
-    tl: int | None = None
+    tl: Time | None = None
     eb: Number | None = None
     sn: float | None = None
     h: Number = 0

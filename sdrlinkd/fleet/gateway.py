@@ -4,6 +4,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Coroutine
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -66,18 +67,19 @@ class Gateway:
             self._daemon.declare,
         )
         self._bridge = Bridge(
+            self._own_id,
             self._keys,
             params.bridge,
             session,
             self._counts,
-            lambda: not self._others.has_bridge_before(self._robots.is_near),
+            lambda: self._others.has_bridge_before(self._robots.is_near),
             self._robots.is_near,
             setup.republished,
             self._daemon.declare,
         )
         self._ros: RosSide | None = None
         if params.ros_domain is not None:
-            self._ros = RosSide(session, setup, params.ros_domain, self._daemon.ask)
+            self._ros = RosSide(session, setup, params.ros_domain, self._daemon.ask, self._leads)
             self._up.on_put = self._ros.put
         self._alarm = Alarm(self._do_due)
         self._sending: set[asyncio.Task[None]] = set()
@@ -91,7 +93,7 @@ class Gateway:
         session.watch(keys.gateways, self._note_token)
         session.token(keys.gateway(self._own_id))
         self._serve("status", lambda: msgspec.json.encode(self._daemon.snapshot))
-        self._serve("heard", self._heard)
+        self._serve("heard", lambda: msgspec.json.encode(self._daemon.neighbors))
         self._serve("gateway", lambda: msgspec.json.encode(self.report()))
         if self._setup.config.fleet.bridge:
             session.subscribe(keys.all_messages, lambda each: self._bridge.take(each, _now()))
@@ -124,6 +126,7 @@ class Gateway:
             up_again=counts["up_again"],
             down=counts.of(DOWN),
             down_taken=counts["down_taken"],
+            bridges=self._bridge.sends,
             bridge=counts.of(BRIDGE),
             bridge_taken=counts["bridge_taken"],
             calls={} if self._ros is None else dict(self._ros.counts),
@@ -138,8 +141,7 @@ class Gateway:
             return
         if message.via is not None:
             # Its own gateway puts it. That nobody else does so makes loops impossible.
-            self._counts.add("up_taken")
-            self._counts.add("up_bridged")
+            self._up.leave_bridged()
             return
         now, topic = _now(), message.topic.removeprefix(prefix)
         robot = self._robots.heard(message.source, now)
@@ -156,7 +158,7 @@ class Gateway:
             session.answer(key, lambda _: self._up.answers(robot, _now())),
             session.token(self._keys.hears(self._own_id, robot)),
         ]
-        if self._ros is not None and self._setup.config.fleet.down:
+        if self._ros is not None:
             ends.append(self._ros.follow(robot, self._take_from_ros))
         return ends
 
@@ -171,6 +173,11 @@ class Gateway:
             if order is not None:
                 self._spawn(self._down.send(order, now))
         self._set_alarm()
+
+    def _leads(self, robot: int) -> bool:
+        """Whether this gateway leads for a robot at this moment."""
+        known = self._robots.get(robot)
+        return known is not None and known.election.leads
 
     def _take_from_ros(self, given: FromRos, cdr: bytes) -> None:
         known, now = self._robots.get(given.told.robot), _now()
@@ -213,8 +220,7 @@ class Gateway:
             return
         _log.info("joined fleet %s as gateway %d", self._fleet, self._own_id)
         self._up.reach(_now())
-        if self._setup.config.fleet.bridge:
-            self._spawn(self._bridge.ask())
+        self._bridge.reach()
         loop = asyncio.get_running_loop()
         loop.call_later(SETTLED_S, lambda: self._put_again(are_led=True))
         loop.call_later(SETTLED_S + OTHERS_S, lambda: self._put_again(are_led=False))
@@ -227,12 +233,12 @@ class Gateway:
 
     def _see(self, snapshot: Snapshot | None) -> None:
         """Take the daemon's report: which robots it hears, and how well."""
+        now = _now()
         if snapshot is not None:
-            self._classes = {
-                self._setup.name_on_air(each.name): each.qos for each in snapshot.link.topics
-            }
-        heard = [] if snapshot is None else snapshot.link.neighbors
-        self._robots.note([each for each in heard if not each.is_self], _now())
+            topics = snapshot.link.topics
+            self._classes = {self._setup.name_on_air(each.name): each.qos for each in topics}
+        self._robots.note(self._daemon.neighbors, now)
+        self._bridge.see(snapshot is not None, now)
 
     async def _tick(self) -> None:
         while True:
@@ -240,7 +246,7 @@ class Gateway:
             for each in self._robots:
                 self._lead(each, now)
             if self._ros is not None:
-                self._ros.lead([each.id for each in self._robots if each.election.leads])
+                self._ros.look(self._robots, now)
             await asyncio.sleep(TICK_S)
 
     def _lead(self, robot: HeardRobot, now: float) -> None:
@@ -250,9 +256,14 @@ class Gateway:
         claim = robot.election.poll(now)
         if claim is not None:
             self._session.put(self._keys.route(robot.id), encode(claim), None, "urgent")
-        if robot.election.leads and not led:
+        if not robot.election.leads:
+            robot.led_since = inf
+        elif not led:
+            robot.led_since = now
             _log.info("leads for robot %d", robot.id)
             self._up.put_due(robot, now, all_held=True)
+            if self._ros is not None:
+                self._ros.take_over(self._up.last_items(robot.id, now))
 
     def _set_alarm(self) -> None:
         """Wake up when something that is held is due."""
@@ -270,11 +281,6 @@ class Gateway:
         task = asyncio.get_running_loop().create_task(work)
         self._sending.add(task)
         task.add_done_callback(self._sending.discard)
-
-    def _heard(self) -> bytes:
-        snapshot = self._daemon.snapshot
-        neighbors = [] if snapshot is None else snapshot.link.neighbors
-        return msgspec.json.encode([each for each in neighbors if not each.is_self])
 
 
 def _now() -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.fleet.election import Election
@@ -28,6 +29,8 @@ class HeardRobot:
     election: Election
     forwarding: Forwarding[Upward]
     heard_at: float
+    led_since: float = inf
+    """When this gateway began to lead, in s; inf: it does not."""
     ends: list[Callable[[], None]] = field(default_factory=list)
     """Take down what was declared on Zenoh for this robot."""
 

@@ -22,12 +22,13 @@ sent, for the reason in the name (fleet document, 5).
 """
 BRIDGE = (
     "bridge_sent", "bridge_near", "bridge_left", "bridge_not_allowed", "bridge_repeated",
-    "bridge_stop", "bridge_waiting", "bridge_overflow", "bridge_refused", "bridge_no_daemon",
+    "bridge_stop", "bridge_no_age", "bridge_waiting", "bridge_overflow", "bridge_refused",
+    "bridge_no_daemon",
 )  # fmt: skip
 """Ends of messages that other gateways put: handed to the daemon; not sent, as the robot is on this
 air itself; left to another gateway of this air; of topics that `fleet.bridge` does not name; known;
-stop messages, which each robot makes itself; waiting for the daemon; too old when others waited;
-refused by the daemon; lost as it was away.
+stop messages, which each robot makes itself; last messages of unknown age; waiting for the daemon;
+the oldest when too many waited; refused by the daemon; lost as it was away, or has just come back.
 """
 
 
@@ -73,6 +74,8 @@ class GatewayReport(msgspec.Struct, frozen=True, kw_only=True):
     """Commands to robots by their end; they add up to `down_taken`."""
     down_taken: int
     """Commands to robots."""
+    bridges: bool
+    """Whether it sends to its robots for those on other airs now."""
     bridge: dict[str, int]
     """Messages that other gateways put by their end; they add up to `bridge_taken`."""
     bridge_taken: int

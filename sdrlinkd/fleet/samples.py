@@ -30,3 +30,15 @@ class Answer(NamedTuple):
     key: str
     payload: bytes
     attachment: bytes | None = None
+
+
+class Putter:
+    """Puts values at one key; `end` takes down what was declared for that."""
+
+    def __init__(self, put: Callable[[bytes, bytes | None], bool], end: Callable[[], None]) -> None:
+        self._put = put
+        self.end = end
+
+    def __call__(self, payload: bytes, attachment: bytes | None) -> bool:
+        """Put a value; False if too many puts wait."""
+        return self._put(payload, attachment)

@@ -19,7 +19,7 @@ import zenoh.ext
 from sdrlinkd.config import FleetParams
 from sdrlinkd.errors import UserError
 from sdrlinkd.fleet.putting import Lane
-from sdrlinkd.fleet.samples import Answer, Question, Sample
+from sdrlinkd.fleet.samples import Answer, Putter, Question, Sample
 from sdrlinkd.fleet.zenoh_config import cause, make_zenoh_config
 
 MOST_WAITING = 8192
@@ -53,6 +53,7 @@ class Session:
         self._may_query = threading.BoundedSemaphore(MOST_QUERIES)
         self._lanes = {name: Lane(f"zenoh-{name}") for name in ("block", "drop")}
         self._answers = Lane("zenoh-answers", MOST_QUERIES)
+        self._replies = Lane("zenoh-replies")
         self._transports = 0
         self._declared: list[Any] = []
         self.on_reach: Callable[[bool], None] = lambda _is_reached: None
@@ -94,26 +95,29 @@ class Session:
             )
         )  # fmt: skip
 
-    def publisher(
-        self, key: str, qos: str, encoding: str, kept: int
-    ) -> Callable[[bytes, bytes | None], bool]:
+    def publisher(self, key: str, qos: str, encoding: str, kept: int) -> Putter:
         """What puts values at `key` with the priority of class `qos`.
 
-        With `kept` above 0, subscribers that come later get the last values. What it returns is
-        False if too many puts wait.
+        With `kept` above 0, subscribers that come later get the last values.
         """
         if not kept:
-            return lambda payload, attachment: self.put(key, payload, attachment, qos, encoding)
+            return Putter(
+                lambda payload, attachment: self.put(key, payload, attachment, qos, encoding),
+                lambda: None,
+            )
         priority, express, congestion = _QOS.get(qos, _QOS["default"])
         publisher = zenoh.ext.declare_advanced_publisher(
             self._session, key, priority=priority, express=express, congestion_control=congestion,
             encoding=encoding, cache=zenoh.ext.CacheConfig(max_samples=kept),
             publisher_detection=True,
         )  # fmt: skip
-        self._keep(publisher)
+        end = self._keep(publisher)
         lane = self._lanes["block" if congestion is zenoh.CongestionControl.BLOCK else "drop"]
-        return lambda payload, attachment: lane.offer(
-            lambda: publisher.put(payload, attachment=attachment)
+        return Putter(
+            lambda payload, attachment: lane.offer(
+                lambda: publisher.put(payload, attachment=attachment)
+            ),
+            end,
         )
 
     def subscribe(self, key: str, take: Callable[[Sample], None]) -> Callable[[], None]:
@@ -168,11 +172,14 @@ class Session:
                     query.reply(query.key_expr, payload, attachment=attachment)
                     query.drop()  # type: ignore[no-untyped-call]
 
-                self._answers.offer(send)
+                self._replies.offer(send)
+
+            def drop() -> None:
+                self._replies.offer(query.drop)
 
             payload = b"" if query.payload is None else query.payload.to_bytes()
             attachment = None if query.attachment is None else query.attachment.to_bytes()
-            question = Question(payload, attachment, reply, query.drop)
+            question = Question(payload, attachment, reply, drop)
             self._post(lambda: take(question))
 
         # All calls are for this one server, as rmw_zenoh asks those that are complete.
@@ -189,7 +196,7 @@ class Session:
 
     async def close(self) -> None:
         """Take everything down; what was put has a moment to leave."""
-        for each in (*self._lanes.values(), self._answers):
+        for each in (*self._lanes.values(), self._answers, self._replies):
             await asyncio.to_thread(each.close)
         await asyncio.to_thread(self._session.close)
 

@@ -61,6 +61,7 @@ class UpwardMessages:
             self._settled_at = inf
             self._missed.add(key)
             self._counts.add("up_away")
+            self._pass_on(robot, item)
             return
         turn = robot.forwarding.heard(
             (key, message.series), message.name, item, now, leads=robot.election.leads
@@ -69,6 +70,11 @@ class UpwardMessages:
             self._put(robot, item, now)
         else:
             self._counts.add(_NOT_PUT[turn])
+
+    def leave_bridged(self) -> None:
+        """Leave a message of a robot on another air, which a gateway has sent, to its gateway."""
+        self._counts.add("up_taken")
+        self._counts.add("up_bridged")
 
     def passed(self, robot: HeardRobot, sample: Sample, now: float) -> None:
         """Note that another gateway has put a message of a robot."""
@@ -109,6 +115,15 @@ class UpwardMessages:
                 self._counts.add("up_again", self._session.put(key, payload, encode(aged), "bulk"))
                 self._missed.discard(key)
 
+    def last_items(self, robot: int, now: float) -> Iterator[tuple[TopicKey, Upward]]:
+        """The last message of each topic of a robot, to be put."""
+        for key in self._last.keys_at(self._keys.message(robot, "") + "/"):
+            told, kept = self._keys.read_message(key), self._last.get(key)
+            if told is not None and kept is not None:
+                payload, passed, at = kept
+                qos = self._class_of(told.topic)
+                yield told, Upward(key, payload, _aged(passed, now - at), qos, now)
+
     def answers(self, robot: int, now: float) -> Iterator[Answer]:
         """The last message of each topic of a robot."""
         prefix = self._keys.message(robot, "") + "/"
@@ -133,6 +148,9 @@ class UpwardMessages:
         attachment = encode(_aged(item.passed, now - item.at))
         is_put = self._session.put(item.key, item.payload, attachment, item.qos)
         self._counts.add("up_put" if is_put else "up_overflow")
+        self._pass_on(robot, item)
+
+    def _pass_on(self, robot: HeardRobot, item: Upward) -> None:
         is_ours = robot.election.leads or robot.election.leader is None
         if self.on_put is not None and is_ours and (told := self._keys.read_message(item.key)):
             self.on_put(told, item)

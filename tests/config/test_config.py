@@ -279,7 +279,8 @@ def test_text_stays_text_where_no_quantity_is_wanted():
     "form", ["/rx_robot_{src_id}", "/a/r{src}/b/", "/r{src_id}/from_{src_id}"]
 )  # fmt: skip
 def test_where_another_robots_messages_appear_is_the_name_of_its_topic(form):
-    setup = make_setup(Config(namespace="robot_7", rx_format=form), ETC)
+    text = f'namespace = "robot_7"\nrx_format = "{form}"\nauto = true\n[fleet]\nbridge = ["*"]'
+    setup = make_setup(parse_config(text), ETC)
     for robot in (0, 1, 254):
         there = setup.republished(robot, "camera/image")
         assert setup.name_on_air(there) == f"@{robot}/camera/image"
@@ -287,6 +288,18 @@ def test_where_another_robots_messages_appear_is_the_name_of_its_topic(form):
     assert setup.name_on_air(setup.republished(255, "odom")) == setup.republished(255, "odom")[1:]
     assert setup.name_on_air("/robot_7/odom") == "odom"
     assert setup.name_on_bus("odom") == "/robot_7/odom"
+
+
+def test_without_a_bridge_a_name_is_this_robots_own():
+    setup = make_setup(Config(namespace="robot_7", rx_format="/robot_{src_id}"), ETC)
+    assert setup.name_on_air("/robot_7/odom") == "odom"
+    assert setup.name_on_air("/robot_2/cmd_vel") == "robot_2/cmd_vel"
+
+
+def test_commands_and_what_is_bridged_have_different_names():
+    text = 'auto = true\nrx_format = "/robot_{src}/"\n[fleet]\nbridge = ["odom"]'
+    with pytest.raises(ConfigError, match=r"rx_format: got .* the form of commands to robots"):
+        make_setup(parse_config(text), ETC)
 
 
 def test_a_bridge_needs_declared_topics():

@@ -53,6 +53,7 @@ class Islands:
         for gateway in GATEWAYS:
             self.gateways[gateway] = self.gateway(gateway)
         wait_for(lambda: all(self.sees_all(robots) for robots in (NEAR, FAR)))
+        wait_for(lambda: [self.report(each).bridges for each in GATEWAYS] == [True, True, False])
         return self
 
     def gateway(self, gateway):
@@ -166,7 +167,7 @@ def test_another_gateway_takes_over_and_the_last_map_comes_late(islands):
     islands.gateways[8].kill()
     with Hearing(islands.daemons[5]) as far:
         wait_for(lambda: far.numbers("/rx_robot_1/map")[-1:] == [2])
-        wait_for(lambda: 8 not in islands.report(9).others)
+        wait_for(lambda: islands.report(9).bridges)
         islands.publish(1, "odom", 30)
         wait_for(lambda: len(far.numbers("/rx_robot_1/odom")) == 30)
     assert {each.via for each in far.messages if each.topic.endswith("odom")} == {9}
@@ -198,7 +199,7 @@ def test_a_robot_takes_commands_over_a_bridge_only_from_both(islands):
 
 
 def test_nobody_sends_for_another_robot_without_a_bridge(start_daemon):
-    daemon = start_daemon("auto = true\n")
+    daemon = start_daemon('auto = true\n[fleet]\nbridge = ["scan"]\n')
     wanted = {"name": "/rx_robot_2/odom", "type": "nav_msgs/msg/Odometry"}
     with daemon.control() as control, pytest.raises(RefusedError, match="of robot 2 appear under"):
         control.ask("declare", wanted)

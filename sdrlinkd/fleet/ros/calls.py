@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 from sdrlinkd.calls import (
     ACTION,
     CALL_TYPE,
+    CANCEL_GOAL,
+    GET_RESULT,
     WORDS,
     Asker,
     Ended,
@@ -43,7 +45,9 @@ from sdrlinkd.fleet.topics import matches
 BUSY_S, LOOK_S = 0.02, 0.5
 MOST_PROXIES = 500
 MOST_ASKED = 64
-"""Calls that are under way at a time; further ones are not taken."""
+"""Calls that are under way at a time, and as many to cancel; further ones are not taken."""
+MOST_RESULTS = 512
+"""The same of calls for results, which take as long as the action."""
 UNKNOWN_TOPIC = "tx_unknown_topic"
 NOT_TAKEN = "calls_not_taken"
 
@@ -64,18 +68,23 @@ class Calls:
     """Serves what robots offer, and asks them over the daemon.
 
     `patterns`: the services, or actions, that may be called. `ask` asks the daemon.
+    `leads`: whether this gateway leads for a robot at this moment.
     """
 
-    def __init__(self, graph: Graph, session: Session, patterns: list[str], ask: Ask) -> None:
+    def __init__(
+        self, graph: Graph, session: Session, patterns: list[str], ask: Ask,
+        leads: Callable[[int], bool],
+    ) -> None:  # fmt: skip
         self._graph = graph
         self._session = session
         self._patterns = patterns
         self._ask_daemon = ask
+        self._leads = leads
         self._asker = Asker(secrets.randbits(32), SystemRandom())
         self._asked: dict[int, _Asked] = {}
         self._told: dict[int, list[Service]] = {}
         self._proxies: dict[tuple[int, Service], Callable[[], None]] = {}
-        self._led: frozenset[int] = frozenset()
+        self._served: frozenset[int] = frozenset()
         self._reached: set[int] = set()
         """The robots for which the daemon knows the topic of calls."""
         self._news = asyncio.Event()
@@ -93,14 +102,22 @@ class Calls:
         """The service of a robot with this name, if it offers one."""
         return next((each for each in self._told.get(robot, ()) if each.name == name), None)
 
-    def lead(self, robots: Collection[int]) -> None:
+    def serve(self, robots: Collection[int]) -> None:
         """Serve what these robots offer, and no others.
 
         Where several gateways hear a robot, only one may serve, or a call would be made twice.
         """
-        if self._led != frozenset(robots):
-            self._led = frozenset(robots)
+        if self._served != frozenset(robots):
+            self._served = frozenset(robots)
             self._settle()
+
+    def forget(self, robot: int) -> None:
+        """End the calls of a robot that has gone."""
+        self._told.pop(robot, None)
+        for number in [n for n, asked in self._asked.items() if asked.robot == robot]:
+            self._asker.drop(number)
+            self._end(Ended(number, Status.NO_SERVER))
+        self._settle()
 
     def hear(self, robot: int, payload: bytes) -> None:
         """Take a packet of a robot: an answer, or word that a call runs."""
@@ -159,10 +176,10 @@ class Calls:
                 self._end(Ended(packet.number, Status.TOO_LARGE))
 
     def _settle(self) -> None:
-        """Have a service for each that the robots led offer and that may be called."""
+        """Have a service for each that the robots served offer and that may be called."""
         wanted = {
             (robot, service): None
-            for robot in self._led
+            for robot in self._served
             for service in self._told.get(robot, ())
             if self._may_call(service)
         }
@@ -194,13 +211,19 @@ class Calls:
 
     def _ask(self, robot: int, service: Service, question: Question) -> None:
         attachment = Attachment.parse(question.attachment)
-        if attachment is None or len(self._asked) >= MOST_ASKED:
+        if attachment is None or not self._leads(robot) or not self._has_room(service):
             self.counts[NOT_TAKEN] += 1
             question.drop()
             return
         number = self._asker.ask(robot, service.name, question.payload, time.monotonic())
         self._asked[number] = _Asked(robot, service.name, question, attachment)
         self._news.set()
+
+    def _has_room(self, service: Service) -> bool:
+        """Whether one more call of a kind may be under way."""
+        kind = _kind(service.name)
+        n = sum(_kind(each.service) == kind for each in self._asked.values())
+        return n < (MOST_RESULTS if kind == GET_RESULT else MOST_ASKED)
 
     def _end(self, ended: Ended) -> None:
         asked = self._asked.pop(ended.number, None)
@@ -220,3 +243,8 @@ class Calls:
 
 def _bus_name(robot: int) -> str:
     return f"/{calls_name(robot)}"
+
+
+def _kind(service: str) -> str:
+    """The end of the name by which calls differ in how long they take; empty for most."""
+    return next((each for each in (GET_RESULT, CANCEL_GOAL) if service.endswith(each)), "")

@@ -16,6 +16,7 @@ _ROOT = "%"
 _KIND = re.compile(r"(\w+)/(msg|srv|action)/(\w+)", re.ASCII)
 _DDS = re.compile(r"(\w+)::(msg|srv|action)::dds_::(\w+)_", re.ASCII)
 _AT_ROBOT = re.compile(r"/robot_(0|[1-9][0-9]{0,2})/(.+)", re.ASCII)
+_HASH = re.compile(r"RIHS01_[0-9a-f]{64}")
 _NAME = re.compile(r"(/[A-Za-z_]\w*)+", re.ASCII)
 
 
@@ -81,6 +82,10 @@ def read_endpoint(token: str) -> Endpoint | None:
     if len(chunks) != 13 or chunks[5] not in {*Role}:
         return None
     name = chunks[9].replace(_ROOT, "/")
+    is_hash = _HASH.fullmatch(chunks[11]) or chunks[11] == UNKNOWN_HASH
+    if not is_name(name) or not ros_type(chunks[10]) or not is_hash:
+        # A wildcard would match what others put.
+        return None
     return Endpoint(chunks[2], chunks[8], Role(chunks[5]), name, chunks[10], chunks[11])
 
 

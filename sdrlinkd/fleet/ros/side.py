@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ from sdrlinkd.calls import (
 from sdrlinkd.client import Message, NoDaemonError, RefusedError
 from sdrlinkd.config import Setup
 from sdrlinkd.fleet.formats import Command
-from sdrlinkd.fleet.heard_robot import Upward
+from sdrlinkd.fleet.heard_robot import HeardRobot, Upward
 from sdrlinkd.fleet.keys import TopicKey
 from sdrlinkd.fleet.ros.attachment import Attachment
 from sdrlinkd.fleet.ros.calls import Ask, Calls
@@ -35,6 +35,11 @@ from sdrlinkd.fleet.topics import matches
 from sdrlinkd.link import DEFAULT_POLICY
 
 NOTHING = About()
+SETTLED_S = 0.2
+"""Time in s, besides the lease, after which no other gateway takes itself for the leader."""
+MOST_TAKEN = 256
+AGAIN_S = 5.0
+"""Time in s after which the daemon is asked again what robots say of their topics."""
 LOOK_S = 0.2
 """Shortest time in s between two questions to the daemon."""
 MOST_WAITING = 256
@@ -48,9 +53,14 @@ class FromRos(NamedTuple):
 
 
 class RosSide:
-    """A gateway as a node of a ROS graph in `domain`; `ask` asks its daemon."""
+    """A gateway as a node of a ROS graph in `domain`.
 
-    def __init__(self, session: Session, setup: Setup, domain: int, ask: Ask) -> None:
+    `ask` asks its daemon; `leads`: whether it leads for a robot at this moment.
+    """
+
+    def __init__(
+        self, session: Session, setup: Setup, domain: int, ask: Ask, leads: Callable[[int], bool]
+    ) -> None:
         own_id, down = setup.node_id, setup.config.fleet.down
         self._session = session
         self._setup = setup
@@ -60,7 +70,8 @@ class RosSide:
         self._ask = ask
         self._graph = Graph(session, domain, own_id)
         self._topics = Topics(self._graph, session)
-        self._calls = Calls(self._graph, session, down, ask)
+        self._calls = Calls(self._graph, session, down, ask, leads)
+        self._served_after_s = setup.config.fleet.lease_s + SETTLED_S
         self._about: dict[TopicKey, About] = {}
         """What robots say of their topics."""
         self._waiting: deque[tuple[TopicKey, Upward]] = deque(maxlen=MOST_WAITING)
@@ -105,28 +116,54 @@ class RosSide:
         elif topic in (FEEDBACK, STATUS) and leads:
             self._put_of_action(robot, topic, message)
 
+    def take_over(self, last: Iterable[tuple[TopicKey, Upward]]) -> None:
+        """Put what is latched of a robot for which this gateway leads from now on."""
+        for told, item in last:
+            if (about := self._about_of(told)) and about.latched:
+                self._put(told, item, about)
+
     def follow(self, robot: int, take: Callable[[FromRos, bytes], None]) -> Callable[[], None]:
-        """Call `take` with what nodes send to a robot; returns what ends that."""
+        """Call `take` with what nodes send to a robot; returns what ends all that concerns it."""
 
         def heard(sample: Sample) -> None:
             found = self._read(robot, sample)
             if found is not None:
                 take(found, sample.payload)
 
-        return self._session.subscribe(f"{self._domain}{at_robot(robot, '/**')}", heard)
+        key = f"{self._domain}{at_robot(robot, '/**')}"
+        end = self._session.subscribe(key, heard) if self._down else None
 
-    def lead(self, robots: Collection[int]) -> None:
-        """Serve these robots' services, and show which topics go to them."""
-        seen = frozenset(robots), self._graph.version
+        def forget() -> None:
+            if end is not None:
+                end()
+            self._topics.close(robot)
+            self._calls.forget(robot)
+
+        return forget
+
+    def look(self, robots: Iterable[HeardRobot], now: float) -> None:
+        """Serve the services of robots for which this gateway leads, and show what goes to them.
+
+        Only once every other gateway must know who leads: a call must not be made twice.
+        """
+        served = set()
+        for robot in robots:
+            if now >= robot.led_since + self._served_after_s:
+                served.add(robot.id)
+            elif robot.election.leader not in (None, self._own_id):
+                # Its leader has all of that.
+                self._topics.close(robot.id)
+        seen = frozenset(served), self._graph.version
         if seen == self._seen:
             return
         self._seen = seen
-        self._calls.lead(robots)
-        wanted = {
+        self._calls.serve(served)
+        all_wanted = sorted(
             (name, kind, hash_)
             for name, kind, hash_ in self._graph.published()
-            if (found := robot_in(name)) and found[0] in robots and matches(found[1], self._down)
-        }
+            if (found := robot_in(name)) and found[0] in served and matches(found[1], self._down)
+        )
+        wanted = set(all_wanted[:MOST_TAKEN])
         for key in self._taken.keys() - wanted:
             self._taken.pop(key).close()
         for key in wanted - self._taken.keys():
@@ -148,7 +185,8 @@ class RosSide:
     async def _learn(self) -> None:
         """Ask what robots say of their topics when there is a new one."""
         while True:
-            await self._is_new.wait()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._is_new.wait(), AGAIN_S)
             self._is_new.clear()
             with contextlib.suppress(NoDaemonError, RefusedError):
                 self._about = {

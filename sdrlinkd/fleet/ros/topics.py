@@ -1,19 +1,28 @@
 """Messages of robots as topics of this gateway's node."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sdrlinkd.adapters import type_hash
 from sdrlinkd.fleet.ros.attachment import Attachment
 from sdrlinkd.fleet.ros.graph import Graph, Opened
-from sdrlinkd.fleet.ros.names import UNKNOWN_HASH, Qos, Role, data_key, dds_type, is_name
+from sdrlinkd.fleet.ros.names import (
+    UNKNOWN_HASH,
+    Qos,
+    Role,
+    at_robot,
+    data_key,
+    dds_type,
+    is_name,
+)
+from sdrlinkd.fleet.samples import Putter
 from sdrlinkd.fleet.session import Session
 
 MOST_TOPICS = 2048
 ENCODING = "application/cdr;from=sdrlink-gateway"
 """Tells other gateways that a message comes from a robot, and is no command to it."""
-Put = Callable[[bytes, bytes], bool]
+MOST_HASHES = 8
+"""Hashes of one topic's type that are learnt."""
 
 
 class About(NamedTuple):
@@ -38,7 +47,7 @@ class _Topic:
     hash: str
     """Empty: unknown."""
     n_put: int = 0
-    puts: dict[str, Put] = field(default_factory=dict)
+    puts: dict[str, Putter] = field(default_factory=dict)
     """How to put a message, by the hash."""
 
 
@@ -60,13 +69,29 @@ class Topics:
 
         `qos` is the class that sets Zenoh's priority.
         """
-        topic = self._topics.get((name, kind)) or self._open(name, kind, qos, about)
+        topic = self._topics.get((name, kind))
+        if topic is not None and topic.about != about:
+            self._close(name, kind)
+            topic = None
+        topic = topic or self._open(name, kind, qos, about)
         if topic is None:
             return
         topic.n_put += 1
         attachment = Attachment(topic.n_put, sent_ns, topic.opened.gid).build()
-        for hash_ in [topic.hash] if topic.hash else self._learnt(topic):
+        for hash_ in self._hashes(topic):
             self._put_for(topic, hash_)(payload, attachment)
+
+    def close(self, robot: int) -> None:
+        """Take down the topics of a robot, and what is kept of them."""
+        beginning = at_robot(robot, "/")
+        for name, kind in [each for each in self._topics if each[0].startswith(beginning)]:
+            self._close(name, kind)
+
+    def _close(self, name: str, kind: str) -> None:
+        topic = self._topics.pop((name, kind))
+        topic.opened.close()
+        for put in topic.puts.values():
+            put.end()
 
     def _open(self, name: str, kind: str, qos: str, about: About) -> _Topic | None:
         dds = dds_type(kind)
@@ -82,12 +107,17 @@ class Topics:
         topic = self._topics[name, kind] = _Topic(name, dds, about, qos, opened, hash_)
         return topic
 
-    def _learnt(self, topic: _Topic) -> list[str]:
-        beginning = f"RIHS01_{topic.about.hash}"
+    def _hashes(self, topic: _Topic) -> list[str]:
+        """The hashes under which subscriptions expect a topic."""
         found = self._graph.hashes(topic.name, topic.kind)
-        return [each for each in found if each.startswith(beginning) or not topic.about.hash]
+        if topic.hash:
+            # Where ROS has no hashes yet, as in Humble, the keys say so.
+            return [topic.hash, *(each for each in found if each == UNKNOWN_HASH)]
+        beginning = f"RIHS01_{topic.about.hash}"
+        fit = [each for each in found if each.startswith(beginning) or not topic.about.hash]
+        return fit[:MOST_HASHES]
 
-    def _put_for(self, topic: _Topic, hash_: str) -> Put:
+    def _put_for(self, topic: _Topic, hash_: str) -> Putter:
         put = topic.puts.get(hash_)
         if put is None:
             key = data_key(self._graph.domain, topic.name, topic.kind, hash_)

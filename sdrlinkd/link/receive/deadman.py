@@ -18,6 +18,10 @@ class Deadman:
         """Note a message of a topic that must not fall silent for `deadman_s`."""
         self._due_at[src, topic_id] = now + deadman_s
 
+    def disarm(self, src: int, topic_id: int) -> None:
+        """Expect no more messages of a topic from robot `src`."""
+        self._due_at.pop((src, topic_id), None)
+
     def forget(self, topic_id: int) -> None:
         """Disarm a topic's timers."""
         for key in [key for key in self._due_at if key[1] == topic_id]:

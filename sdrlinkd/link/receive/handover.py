@@ -31,12 +31,20 @@ class Handover:
         self._waits: dict[tuple[int, int], Waits] = {}
         """Why messages waited at their source, as the source reports."""
         self._deadman = Deadman()
+        self._commands: dict[tuple[int, str], tuple[int, int]] = {}
+        """From where the last message of a command topic came, by whose topic it is."""
 
     def deliver(self, message: Delivered, policy: TopicPolicy, now: float) -> float | None:
         """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
         key = message.src, message.topic_id
         if policy.deadman_s:
             self._deadman.fresh(*key, now, policy.deadman_s)
+            # What comes from a robot itself and over gateways is one stream of commands.
+            whose = message.topic.origin(message.src), message.topic.at_origin
+            before = self._commands.setdefault(whose, key)
+            if before != key:
+                self._deadman.disarm(*before)
+                self._commands[whose] = key
         if message.origin_at is None:
             return None
         latency = self._latencies.get(key)
