@@ -478,3 +478,51 @@ def test_the_policy_in_force_is_told():
     one.set_policy(topic.id, TopicPolicy(durability="transient_local", depth=4))
     run([one, two], 0.0, 30)
     assert two.heard_topic(1, topic.id).about.depth == 4
+
+
+TWIST = "geometry_msgs/msg/Twist"
+
+
+@pytest.mark.parametrize("first", ["gateway", "robot"])
+def test_commands_over_a_gateway_and_from_their_robot_are_one_stream(first):
+    robot, gateway, receiver = auto(1), auto(8), auto(4)
+    receiver.set_named_policies({"cmd_vel": TopicPolicy(deadman_s=0.3)})
+    own, via = (
+        link.declare(Offer(name, TWIST)).id
+        for link, name in ((robot, "cmd_vel"), (gateway, "@1/cmd_vel"))
+    )
+    senders = [(gateway, via), (robot, own)]
+    silent, heard = [], []
+    for i in range(80):
+        now = 0.05 * i
+        if i < 60:
+            link, topic_id = senders[(i >= 30) == (first == "gateway")]
+            link.submit(topic_id, CDR + bytes((i,)) * 48, now)
+        for link in (robot, gateway):
+            link.handle_timers(now)
+            while burst := compose(link, now, 8):
+                link.confirm(burst, Outcome.SENT, now)
+                for pdu in burst.pdus:
+                    for message in receiver.hear(pdu, now):
+                        receiver.delivered(message, now)
+                        heard.append(message)
+        silent += [(i, *each) for each in receiver.take_silent(now)]
+    assert [each.payload[4] for each in heard] == [*range(60)]
+    assert {each.topic.origin(each.src) for each in heard} == {1}
+    assert {each.topic.at_origin for each in heard} == {"cmd_vel"}
+    # Only the end of all commands is silence.
+    assert [i for i, *_ in silent] == [65]
+    assert receiver.heard_topic(*silent[0][1:]).at_origin == "cmd_vel"
+
+
+@pytest.mark.parametrize(
+    ("allowed", "n"), [([], 5), ([1], 0), ([8], 0), ([1, 8], 5), ([8, 9, 1], 5)]
+)
+def test_a_topic_of_a_robot_elsewhere_is_taken_only_from_both(allowed, n):
+    gateway, receiver = auto(8), auto(4)
+    receiver.set_named_policies({"cmd_vel": TopicPolicy(from_=allowed)})
+    topic = gateway.declare(Offer("@1/cmd_vel", TWIST))
+    for i in range(5):
+        gateway.submit(topic.id, CDR + bytes(48), 0.05 * i)
+    assert len(run([gateway, receiver], 0.0, 20)) == n
+    assert receiver.audit() == []
