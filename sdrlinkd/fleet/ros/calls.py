@@ -112,12 +112,10 @@ class Calls:
             self._settle()
 
     def forget(self, robot: int) -> None:
-        """End the calls of a robot that has gone."""
-        self._told.pop(robot, None)
+        """End the calls of a robot that has gone. What it offers is told only once, so it stays."""
         for number in [n for n, asked in self._asked.items() if asked.robot == robot]:
             self._asker.drop(number)
-            self._end(Ended(number, Status.NO_SERVER))
-        self._settle()
+            self._end(Ended(number, Status.TIMED_OUT))
 
     def hear(self, robot: int, payload: bytes) -> None:
         """Take a packet of a robot: an answer, or word that a call runs."""
