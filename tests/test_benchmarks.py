@@ -58,6 +58,7 @@ ROWS = {
             f"{each}_{n}_gateways" for n in (2, 3)
             for each in ("pdr", "lost_by", "twice", "added_ms_p50", "added_ms_p99")
         ),
+        "added_ms_p50_1_gateway", "added_ms_p99_1_gateway",
         "hand_over_gap_s", "router_killed_s", "gateway_killed_s",
         "wan_pdr", "wan_twice", "wan_copies",
         *(f"wan_late_ms_{each}" for each in ("p50", "p90", "p99")),

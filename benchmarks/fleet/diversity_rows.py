@@ -18,8 +18,11 @@ HAND_OVER_S = 4.0
 
 
 def rows(seed: int, quick: bool) -> Iterator[Row]:
-    """Two and three gateways, and a robot that drives from one to the other."""
+    """One, two and three gateways, and a robot that drives from one to the other."""
     n = 300 if quick else 3000
+    with field({7: 0.0}, seed, routes=True) as where:
+        found = asyncio.run(drive(where, n, PERIOD_S))
+    yield from _added(found, "1_gateway", n, "that is the router, too")
     for gateways in (2, 3):
         losses = dict(list(LOSSES.items())[:gateways])
         with field(losses, seed) as where:
@@ -49,11 +52,15 @@ def _diversity(found: Drive, gateways: int, n: int) -> Iterator[Row]:
         peers={"dropped_by_the_library": found.duplicates},
         note="delivered twice to the operator's program",
     )  # fmt: skip
+    yield from _added(found, name, n, "through a router of its own")
+
+
+def _added(found: Drive, name: str, n: int, how: str) -> Iterator[Row]:
     added = found.added_ms()
     for label, quantile, target in (("p50", 0.5, 1.0), ("p99", 0.99, 10.0)):
         yield Row(
             f"added_ms_{label}_{name}", float(np.quantile(added, quantile)), "ms", target, "less",
-            n, note="from the first gateway's own consumers to the operator's program",
+            n, note=f"from the first gateway's own consumers to the operator's program, {how}",
         )  # fmt: skip
 
 

@@ -32,7 +32,7 @@ def _router_killed(seed: int, n: int) -> Row:
     with field(GATEWAYS, seed) as where, ExitStack() as stack:
 
         def fail(number: int) -> None:
-            if number == n // 2:
+            if number == n // 2 and where.router is not None:
                 where.router.kill()
                 processes.start_module(stack, "router", ROUTER, where.endpoint)
 

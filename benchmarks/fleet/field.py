@@ -33,7 +33,8 @@ class Field:
     """Where gateways find the router, over the wide-area network."""
     folders: dict[int, Path]
     gateways: dict[int, Process]
-    router: Process
+    router: Process | None
+    """A router of its own; None: a gateway is the router."""
 
     @property
     def params(self) -> FleetParams:
@@ -58,22 +59,25 @@ def routed(endpoint: str) -> Iterator[Process]:
 
 
 @contextmanager
-def field(losses: Mapping[int, float], seed: int, wan_ms: float = 0.0) -> Iterator[Field]:
+def field(
+    losses: Mapping[int, float], seed: int, wan_ms: float = 0.0, *, routes: bool = False
+) -> Iterator[Field]:
     """Run the robot's daemon, and for each gateway, which loses so much of it, both its programs.
 
-    The gateways are `wan_ms` away from the router. Raises PeerError.
+    The gateways are `wan_ms` away from the router. With `routes`, the first one is the router
+    itself. Raises PeerError.
     """
     endpoint = free_endpoint()
     far = free_endpoint() if wan_ms else endpoint
     robots = [ROBOT, *losses]
     with PduAir(robots, seed) as air, ExitStack() as stack:
         guard = stack.enter_context(_file(GUARD))
-        fleet = (
-            f'[fleet]\nname = "{FLEET}"\nconnect = ["{far}"]\nzenoh = "{guard}"\n'
-            'down = ["cmd_vel"]\n'
-        )
-        own = {robot: air.settings(robot) + fleet for robot in robots}
-        router = stack.enter_context(routed(endpoint))
+        ends = dict.fromkeys(robots, f'connect = ["{far}"]')
+        if routes:
+            ends[min(losses)] = f'listen = ["{endpoint}"]'
+        more = f'[fleet]\nname = "{FLEET}"\nzenoh = "{guard}"\ndown = ["cmd_vel"]\n'
+        own = {robot: f"{air.settings(robot)}{more}{end}\n" for robot, end in ends.items()}
+        router = None if routes else stack.enter_context(routed(endpoint))
         if wan_ms:
             ports = [each.rpartition(":")[2] for each in (far, endpoint)]
             processes.start_module(stack, "wan", WAN, *ports, str(wan_ms)).line()
