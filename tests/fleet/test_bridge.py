@@ -151,7 +151,9 @@ def test_two_airs_are_one_team(islands):
     assert all(adds_up(each) for each in reports.values())
     # Two gateways bridge on the far air: the lower id sends, and neither puts what it hears so.
     assert reports[8].bridge["bridge_sent"] == 50
-    assert reports[9].bridge["bridge_left"] >= 50
+    # The other one may have found out a moment later who is on its air.
+    left = reports[9].bridge["bridge_left"] + reports[9].bridge["bridge_no_daemon"]
+    assert left >= 50
     assert reports[9].up["up_bridged"] == 50
     assert reports[9].bridge["bridge_sent"] == 0
     # What has come over the bridge did not go up again.
