@@ -7,9 +7,12 @@ from typing import Any
 
 from sdrlinkd.asking import Asker
 from sdrlinkd.client import (
+    UNKNOWN_TOPIC,
+    AsyncPublisher,
     AsyncSubscriber,
     EnvelopeMismatchError,
     Message,
+    MessageRefusedError,
     NoDaemonError,
 )
 from sdrlinkd.errors import UserError
@@ -73,6 +76,30 @@ class DaemonSide:
         """The daemon's answer to `verb`. Raises RefusedError and NoDaemonError."""
         return await self._asker.ask(verb, arguments)
 
-    async def declare(self, name: str, kind: str) -> None:
-        """Declare a topic of type `kind` on the bus. Raises RefusedError and NoDaemonError."""
-        await self._asker.ask("declare", {"name": name, "type": kind})
+    def publisher(self) -> AsyncPublisher:
+        """What publishes on the daemon's bus, also across its restarts. Raises UserError."""
+        try:
+            return AsyncPublisher(runtime_dir=self._directory)
+        except NoDaemonError as error:
+            raise UserError(str(error)) from None
+
+    async def publish(
+        self,
+        out: AsyncPublisher,
+        name: str,
+        cdr: bytes,
+        kind: str,
+        **wishes: Any,  # noqa: ANN401
+    ) -> str | bool | None:
+        """Publish a message of type `kind` by `out`, with the options of `AsyncPublisher.send`.
+
+        A topic that the daemon does not know, as after its restart, is declared first, unless
+        `kind` is empty. Raises MessageRefusedError, RefusedError and NoDaemonError.
+        """
+        try:
+            return await out.send(name, cdr, type=kind or None, **wishes)
+        except MessageRefusedError as error:
+            if error.reason != UNKNOWN_TOPIC or not kind:
+                raise
+        await self.ask("declare", {"name": name, "type": kind})
+        return await out.send(name, cdr, type=kind, **wishes)

@@ -3,11 +3,11 @@
 `python -m benchmarks.peers.plain_zenoh FOLDER TOPIC ENDPOINT`, with the daemon's folder.
 """
 
-import json
 import sys
 
 import zenoh
 
+from benchmarks.peers.zenoh_node import configured
 from sdrlinkd.client import Subscriber
 
 KEY = "plain"
@@ -15,14 +15,7 @@ KEY = "plain"
 
 def plain_config(endpoint: str) -> zenoh.Config:
     """A client of the router at an endpoint."""
-    config = zenoh.Config()
-    for key, value in {
-        "mode": "client",
-        "connect/endpoints": [endpoint],
-        "scouting/multicast/enabled": False,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    return config
+    return configured(mode="client", connect=[endpoint])
 
 
 def main() -> None:

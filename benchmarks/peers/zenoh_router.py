@@ -1,22 +1,16 @@
 """A Zenoh router in a process of its own: `python -m benchmarks.peers.zenoh_router ENDPOINT`."""
 
-import json
 import sys
 import threading
 
 import zenoh
 
+from benchmarks.peers.zenoh_node import configured
+
 
 def router_config(endpoint: str) -> zenoh.Config:
     """The configuration of a router at an endpoint."""
-    config = zenoh.Config()
-    for key, value in {
-        "mode": "router",
-        "listen/endpoints": [endpoint],
-        "scouting/multicast/enabled": False,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    return config
+    return configured(mode="router", listen=[endpoint])
 
 
 def main() -> None:

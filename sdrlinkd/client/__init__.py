@@ -30,6 +30,7 @@ from sdrlinkd.client.announced import (
 from sdrlinkd.client.awaited import DAEMON_GONE
 from sdrlinkd.client.control import ControlClient, RefusedError
 from sdrlinkd.client.errors import (
+    UNKNOWN_TOPIC,
     EnvelopeMismatchError,
     MessageRefusedError,
     NoDaemonError,
@@ -74,6 +75,7 @@ __all__ = [
     "QOS",
     "RECEIPT_PREFIX",
     "SYNC_PREFIX",
+    "UNKNOWN_TOPIC",
     "AsyncPublisher",
     "AsyncSubscriber",
     "ControlClient",

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sdrlinkd.client.errors import MessageRefusedError
+from sdrlinkd.client.errors import UNKNOWN_TOPIC, MessageRefusedError
 
 QOS = ("bulk", "default", "latency", "urgent")
 MAX_PRIORITY = 127
@@ -50,7 +50,7 @@ class Announced:
         """Raise MessageRefusedError if the daemon refuses `size` octets of `type_` for `name`."""
         topic = self.topics.get(name)
         if topic is None:
-            raise MessageRefusedError("tx_unknown_topic", unknown_topic(name, self.topics))
+            raise MessageRefusedError(UNKNOWN_TOPIC, unknown_topic(name, self.topics))
         if size < CDR_HEADER_SIZE:
             raise MessageRefusedError("tx_bad_envelope", too_short(name, size))
         if size > topic.most:

@@ -1,5 +1,8 @@
 """Errors that the client raises."""
 
+UNKNOWN_TOPIC = "tx_unknown_topic"
+"""The ledger's name for a message of a topic that the daemon does not know."""
+
 
 class NoDaemonError(ConnectionError):
     """No sdrlinkd answers in the runtime directory."""

@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections import OrderedDict, deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from math import inf
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ from sdrlinkd.client import (
     NoDaemonError,
     RefusedError,
 )
+from sdrlinkd.daemon_side import DaemonSide
 from sdrlinkd.fleet.formats import Passed, read_passed
 from sdrlinkd.fleet.heard_robots import PRESENT_S
 from sdrlinkd.fleet.keys import Keys, TopicKey
@@ -30,7 +31,6 @@ MOST_WAIT_S = 1.0
 """Longest time in s that a message waits for a daemon that is busy."""
 MOST_TOPICS = 128
 """Topics of other robots; the daemon has 240 numbers for them and for those of its own robot."""
-UNKNOWN_TOPIC = "tx_unknown_topic"
 ANSWER_S = 2.0
 MOST_REMEMBERED = 4096
 
@@ -52,7 +52,7 @@ class Bridge:
     def __init__(
         self, own_id: int, keys: Keys, patterns: list[str], session: Session, counts: Counts,
         is_others: Callable[[], bool], is_near: Callable[[int], bool],
-        bus_name: Callable[[int, str], str], declare: Callable[[str, str], Awaitable[None]],
+        bus_name: Callable[[int, str], str], daemon: DaemonSide,
     ) -> None:  # fmt: skip
         self._own_id = own_id
         self._keys = keys
@@ -65,11 +65,11 @@ class Bridge:
         self._is_reached = asyncio.Event()
         self._is_near = is_near
         self._bus_name = bus_name
-        self._declare = declare
+        self._daemon = daemon
         self._duplicates = Duplicates()
         self._newest: OrderedDict[tuple[str, int], MessageName | None] = OrderedDict()
         """Name of the last message that was sent, by key and series."""
-        self._topics: dict[str, None] = {}
+        self._topics: set[str] = set()
         """The topics for which the daemon has numbers, by their names on the bus."""
         self._waiting: deque[_Waiting] = deque()
         self._came = asyncio.Event()
@@ -101,16 +101,20 @@ class Bridge:
     def see(self, is_there: bool, now: float) -> None:
         """Note whether the daemon answers."""
         self._settled_at = min(self._settled_at, now + PRESENT_S) if is_there else inf
+        if not is_there:
+            # It begins with new numbers, if it has restarted.
+            self._topics.clear()
 
     def reach(self) -> None:
         """Note that the network is there from now on."""
         self._is_reached.set()
 
-    async def run(self, directory: str | None) -> None:
+    async def run(self, publisher: AsyncPublisher) -> None:
         """Hand what waits to the daemon, forever."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self._ask())
-            group.create_task(self._hand_over(directory))
+            while True:
+                await self._send(publisher)
 
     async def _ask(self) -> None:
         """Take the last messages, as far as they are new, whenever the network has come."""
@@ -121,15 +125,6 @@ class Bridge:
                 await asyncio.sleep(LOOK_S)
             for answer in await self._session.get(self._keys.all_messages, ANSWER_S):
                 self.take(Sample(*answer), time.monotonic())
-
-    async def _hand_over(self, directory: str | None) -> None:
-        while True:
-            try:
-                async with AsyncPublisher(runtime_dir=directory) as publisher:
-                    while True:
-                        await self._send(publisher)
-            except NoDaemonError:
-                await asyncio.sleep(LOOK_S)
 
     def _end(self, key: str, told: TopicKey, passed: Passed, now: float) -> str:
         """Why a message is not sent; empty if it is."""
@@ -162,7 +157,7 @@ class Bridge:
             self._newest.popitem(last=False)
 
     async def _send(self, publisher: AsyncPublisher) -> None:
-        """Hand the next message to the daemon. Raises NoDaemonError."""
+        """Hand the next message to the daemon."""
         while not self._waiting:
             self._came.clear()
             await self._came.wait()
@@ -175,29 +170,15 @@ class Bridge:
         if name not in self._topics and len(self._topics) >= MOST_TOPICS:
             self._counts.move("bridge_waiting", "bridge_refused")
             return
-        self._topics[name] = None
+        self._topics.add(name)
         age_ns = 1_000 * (passed.age or 0) + round(1e9 * (time.monotonic() - at))
-        published_ns = time.time_ns() - age_ns
-
-        async def send() -> None:
-            await publisher.send(
-                name, payload, type=passed.ty or None, key=str(passed.sr) if passed.sr else None,
-                published_ns=published_ns, timeout_s=MOST_WAIT_S,
-            )  # fmt: skip
-
         try:
-            try:
-                await send()
-            except MessageRefusedError as error:
-                if error.reason != UNKNOWN_TOPIC:
-                    raise
-                # A daemon that has started again does not know the topic, either.
-                await self._declare(name, passed.ty)
-                await send()
+            await self._daemon.publish(
+                publisher, name, payload, passed.ty, key=str(passed.sr) if passed.sr else None,
+                published_ns=time.time_ns() - age_ns, timeout_s=MOST_WAIT_S,
+            )  # fmt: skip
         except (MessageRefusedError, RefusedError):
             end = "bridge_refused"
         except NoDaemonError:
             end = "bridge_no_daemon"
-            raise
-        finally:
-            self._counts.move("bridge_waiting", end)
+        self._counts.move("bridge_waiting", end)

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 
 from sdrlinkd.client import (
     AsyncPublisher,
@@ -11,6 +11,7 @@ from sdrlinkd.client import (
     Receipt,
     RefusedError,
 )
+from sdrlinkd.daemon_side import DaemonSide
 from sdrlinkd.fleet.commands import TAKEN, Commands, Id, Order, Refusal
 from sdrlinkd.fleet.formats import Command, Fate, encode, is_passed, read_command, read_fate
 from sdrlinkd.fleet.keys import Keys, TopicKey
@@ -32,7 +33,7 @@ class DownwardCommands:
 
     def __init__(
         self, own_id: int, keys: Keys, patterns: list[str], session: Session, counts: Counts,
-        bus_name: Callable[[str], str], declare: Callable[[str, str], Awaitable[None]],
+        bus_name: Callable[[str], str], daemon: DaemonSide,
     ) -> None:  # fmt: skip
         self._own_id = own_id
         self._keys = keys
@@ -40,7 +41,7 @@ class DownwardCommands:
         self._session = session
         self._counts = counts
         self._bus_name = bus_name
-        self._declare = declare
+        self._daemon = daemon
         self._commands = Commands(own_id)
         self._awaited: dict[str, Id] = {}
         """The commands of which the daemon has yet to give a receipt, by its id."""
@@ -61,10 +62,6 @@ class DownwardCommands:
         command = read_command(sample.attachment)
         return self.take_command(told, command, sample.payload, score, now, leads=leads)
 
-    def may_send(self, topic: str) -> bool:
-        """Whether messages of a topic may be sent to robots."""
-        return matches(topic, self._patterns)
-
     def take_command(
         self, told: TopicKey, command: Command | None, cdr: bytes, score: float | None, now: float,
         *, leads: bool,
@@ -74,7 +71,7 @@ class DownwardCommands:
         `score`: how well this gateway hears the robot; None: not at all.
         """
         self._counts.add("down_taken")
-        if not is_topic_name(told.topic) or not self.may_send(told.topic):
+        if not is_topic_name(told.topic) or not matches(told.topic, self._patterns):
             self._counts.add("down_not_allowed")
             return None
         if command is None:
@@ -119,20 +116,11 @@ class DownwardCommands:
         came_ns = time.time_ns() - round(1e9 * (now - order.came_at))
         wait_s = min(MOST_WAIT_S, max(0.0, order.until - now))
 
-        async def send() -> str | bool | None:
-            return await publisher.send(
-                name, order.cdr, qos=command.q or None, dst=robot, lifespan_ms=command.ls,
-                type=command.ty or None, published_ns=came_ns, receipt=True, timeout_s=wait_s,
-            )  # fmt: skip
-
         try:
-            try:
-                id_ = await send()
-            except MessageRefusedError:
-                if not command.ty:
-                    raise
-                await self._declare(name, command.ty)
-                id_ = await send()
+            id_ = await self._daemon.publish(
+                publisher, name, order.cdr, command.ty, qos=command.q or None, dst=robot,
+                lifespan_ms=command.ls, published_ns=came_ns, receipt=True, timeout_s=wait_s,
+            )  # fmt: skip
         except (MessageRefusedError, RefusedError) as error:
             self._counts.add("down_refused")
             self._say(order.id, "dropped", str(error)[:120])
@@ -144,25 +132,16 @@ class DownwardCommands:
             self._awaited[str(id_)] = order.id
             self._awaits.set()
 
-    async def follow(self, directory: str | None) -> None:
-        """Stay connected to the daemon, and pass on what becomes of commands."""
+    async def follow(self, publisher: AsyncPublisher) -> None:
+        """Send by `publisher` from now on, and pass on what becomes of commands, forever."""
+        self._publisher = publisher
         while True:
-            try:
-                await self._follow(directory)
-            except NoDaemonError:
-                self._publisher = None
-                await asyncio.sleep(LOOK_S)
-
-    async def _follow(self, directory: str | None) -> None:
-        async with AsyncPublisher(runtime_dir=directory) as publisher:
-            self._publisher = publisher
-            while True:
-                await self._awaits.wait()
-                receipt = await publisher.receipt(LOOK_S)
-                if receipt is not None:
-                    self._received(receipt)
-                elif not self._awaited:
-                    self._awaits.clear()
+            await self._awaits.wait()
+            receipt = await publisher.receipt(LOOK_S)
+            if receipt is not None:
+                self._received(receipt)
+            elif not self._awaited:
+                self._awaits.clear()
 
     def _received(self, receipt: Receipt) -> None:
         id_ = self._awaited.pop(receipt.id, None)

@@ -43,8 +43,7 @@ class Gateway:
         params = setup.config.fleet
         self._setup = setup
         self._session = session
-        self._directory = setup.config.bus.runtime_dir or None
-        self._daemon = DaemonSide(self._directory)
+        self._daemon = DaemonSide(setup.config.bus.runtime_dir or None)
         self._own_id = setup.node_id
         self._fleet = params.name
         self._keys = Keys(params.name)
@@ -64,7 +63,7 @@ class Gateway:
             session,
             self._counts,
             setup.name_on_bus,
-            self._daemon.declare,
+            self._daemon,
         )
         self._bridge = Bridge(
             self._own_id,
@@ -75,11 +74,11 @@ class Gateway:
             lambda: self._others.has_bridge_before(self._robots.is_near),
             self._robots.is_near,
             setup.republished,
-            self._daemon.declare,
+            self._daemon,
         )
         self._ros: RosSide | None = None
         if params.ros_domain is not None:
-            self._ros = RosSide(session, setup, params.ros_domain, self._daemon.ask, self._leads)
+            self._ros = RosSide(session, setup, params.ros_domain, self._daemon, self._leads)
             self._up.on_put = self._ros.put
         self._alarm = Alarm(self._do_due)
         self._sending: set[asyncio.Task[None]] = set()
@@ -100,16 +99,16 @@ class Gateway:
             session.token(keys.bridges(self._own_id))
         if self._ros is not None:
             self._ros.start()
-        async with asyncio.TaskGroup() as group:
+        async with self._daemon.publisher() as out, asyncio.TaskGroup() as group:
             group.create_task(self._daemon.listen(self._take))
             group.create_task(self._daemon.look(self._see))
             group.create_task(self._tick())
             if self._setup.config.fleet.down:
-                group.create_task(self._down.follow(self._directory))
+                group.create_task(self._down.follow(out))
             if self._ros is not None:
-                group.create_task(self._ros.run(self._directory))
+                group.create_task(self._ros.run(out))
             if self._setup.config.fleet.bridge:
-                group.create_task(self._bridge.run(self._directory))
+                group.create_task(self._bridge.run(out))
 
     def report(self) -> GatewayReport:
         """The gateway at this moment."""

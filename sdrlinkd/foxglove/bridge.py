@@ -30,7 +30,6 @@ class Bridge:
     def __init__(
         self, directory: str | None, host: str, port: int, patterns: Sequence[str]
     ) -> None:
-        self._directory = directory
         self._daemon = DaemonSide(directory)
         self._context = context = Context()
         self._topics = ReceivedTopics(context)
@@ -38,7 +37,7 @@ class Bridge:
         self._status = Channel(STATUS, schema=json_schema(Snapshot), context=context)
         self._about = Channel(BRIDGE, schema=json_schema(BridgeReport), context=context)
         self._slow = SlowClients()
-        self._operators = Operators(patterns, self._say, self._daemon.declare, self._topics.again)
+        self._operators = Operators(patterns, self._say, self._daemon.publish, self._topics.again)
         self._server = start_server(host, port, context, self._operators)
         self.port = self._server.port
         """The port that clients connect to."""
@@ -46,10 +45,10 @@ class Bridge:
     async def run(self, topics: Sequence[str]) -> None:
         """Work until cancelled; `topics` as for a subscriber. Raises UserError."""
         try:
-            async with asyncio.TaskGroup() as group:
+            async with self._daemon.publisher() as out, asyncio.TaskGroup() as group:
                 group.create_task(self._daemon.listen(self._take, topics))
                 group.create_task(self._daemon.look(self._see))
-                group.create_task(self._operators.send_all(self._directory))
+                group.create_task(self._operators.send_all(out))
         finally:
             await asyncio.to_thread(self._server.stop)
             self._slow.close()

@@ -28,6 +28,10 @@ MOST_WAIT_S = 1.0
 _log = logging.getLogger(__name__)
 
 
+Publish = Callable[..., Awaitable[object]]
+"""`DaemonSide.publish`."""
+
+
 class _Waiting(NamedTuple):
     command: Command
     data: bytes
@@ -42,12 +46,12 @@ class Operators(ServerListener):
 
     def __init__(
         self, patterns: Sequence[str], say: Callable[[str, str], None],
-        declare: Callable[[str, str], Awaitable[None]], subscribed: Callable[[str, int], None],
+        publish: Publish, subscribed: Callable[[str, int], None],
     ) -> None:  # fmt: skip
         self._patterns = list(patterns)
         self._subscribed = subscribed
         self._say = say
-        self._declare = declare
+        self._publish = publish
         self._loop = asyncio.get_running_loop()
         self._advertised: dict[tuple[int, int], Command | str] = {}
         self._lock = threading.Lock()
@@ -98,14 +102,13 @@ class Operators(ServerListener):
         if wakes:
             self._soon(self._has_come.set)
 
-    async def send_all(self, directory: str | None) -> None:
+    async def send_all(self, out: AsyncPublisher) -> None:
         """Send commands as they come, until cancelled."""
-        async with AsyncPublisher(runtime_dir=directory) as publisher:
-            while True:
-                await self._has_come.wait()
-                self._has_come.clear()
-                while (next_ := self._next()) is not None:
-                    await self._send(next_, publisher)
+        while True:
+            await self._has_come.wait()
+            self._has_come.clear()
+            while (next_ := self._next()) is not None:
+                await self._send(next_, out)
 
     def _next(self) -> _Waiting | None:
         with self._lock:
@@ -117,31 +120,19 @@ class Operators(ServerListener):
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(call, *arguments)
 
-    async def _send(self, waiting: _Waiting, publisher: AsyncPublisher) -> None:
+    async def _send(self, waiting: _Waiting, out: AsyncPublisher) -> None:
         command = waiting.command
         try:
-            name = self._bus_name(command)
-            cdr = _cdr(command, waiting.data)
-            try:
-                await self._publish(publisher, name, cdr, waiting)
-            except MessageRefusedError as error:
-                if error.reason != "tx_unknown_topic":
-                    raise
-                await self._declare(name, command.type)
-                await self._publish(publisher, name, cdr, waiting)
+            name, cdr = self._bus_name(command), _cdr(command, waiting.data)
+            await self._publish(
+                out, name, cdr, command.type, qos="urgent", dst=command.robot,
+                published_ns=waiting.came_ns, timeout_s=MOST_WAIT_S,
+            )  # fmt: skip
         except (MessageRefusedError, RefusedError, UserError, NoDaemonError) as error:
             self.refused += 1
             self._refuse(command.name, f"{command.name}: not sent: {error}")
         else:
             self.sent += 1
-
-    async def _publish(
-        self, publisher: AsyncPublisher, name: str, cdr: bytes, waiting: _Waiting
-    ) -> None:
-        await publisher.send(
-            name, cdr, qos="urgent", dst=waiting.command.robot, type=waiting.command.type,
-            published_ns=waiting.came_ns, timeout_s=MOST_WAIT_S,
-        )  # fmt: skip
 
     def _bus_name(self, command: Command) -> str:
         """What the command is called on the bus.

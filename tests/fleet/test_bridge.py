@@ -176,6 +176,26 @@ def test_another_gateway_takes_over_and_the_last_map_comes_late(islands):
     assert adds_up(islands.report(9))
 
 
+def test_a_daemon_that_starts_again_learns_the_topics_again(islands):
+    islands.start(["odom"])
+    daemon = islands.daemons[8]
+    with Hearing(islands.daemons[4]) as far:
+        islands.publish(1, "odom", 10)
+        wait_for(lambda: len(far.numbers("/rx_robot_1/odom")) == 10)
+        assert daemon.stop() == 0
+        wait_for(lambda: islands.report(9).bridges)
+        islands.publish(1, "odom", 10, first=10)
+        wait_for(lambda: len(far.numbers("/rx_robot_1/odom")) == 20)
+        daemon.at_work()
+        wait_for(lambda: islands.report(8).bridges and not islands.report(9).bridges)
+        islands.publish(1, "odom", 10, first=20)
+        wait_for(lambda: len(far.numbers("/rx_robot_1/odom")) == 30)
+    assert far.numbers("/rx_robot_1/odom") == [*range(30)]
+    ways = [each.via for each in far.messages]
+    assert (set(ways[:10]), set(ways[10:20]), set(ways[20:])) == ({8}, {9}, {8})
+    assert all(adds_up(islands.report(gateway)) for gateway in GATEWAYS)
+
+
 def test_a_robot_that_comes_over_is_not_sent_any_more(islands):
     islands.start(["*"])
     with Hearing(islands.daemons[4]) as far:

@@ -170,10 +170,10 @@ def _subscribe(stuck, url):
 async def test_of_a_flood_of_commands_the_newest_counts():
     said, patterns = [], ["/robot_2/*"]
 
-    async def declare(name, kind):
+    async def publish(*_, **__):
         raise AssertionError
 
-    taker = operators.Operators(patterns, lambda *each: said.append(each), declare, print)
+    taker = operators.Operators(patterns, lambda *each: said.append(each), publish, print)
     client = type("Client", (), {"id": 1})
     for number, topic in enumerate(("/robot_2/cmd_vel", "/robot_2/led", "/robot_3/cmd_vel")):
         shape = {"id": number, "topic": topic, "schema_name": "a/B", "encoding": "cdr"}

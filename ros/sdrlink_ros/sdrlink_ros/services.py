@@ -36,14 +36,13 @@ from sdrlinkd.calls import (
     told,
     understood,
 )
-from sdrlinkd.client import Message, MessageRefusedError, Publisher
+from sdrlinkd.client import UNKNOWN_TOPIC, Message, MessageRefusedError, Publisher
 
 BUSY_S, IDLE_S = 0.02, 0.5
 """Longest wait in s of the thread, with and without calls that are not over."""
 LOST_S = 3.0
 """Time of silence in s after which the proxies of a robot's services go."""
 STOP_S = 2.0
-UNKNOWN_TOPIC = "tx_unknown_topic"
 
 
 class Services:

@@ -1,14 +1,14 @@
 """Services of robots as services of this gateway's node: each call is executed at most once."""
 
 import asyncio
+import contextlib
 import logging
 import secrets
 import time
 from collections import Counter
-from collections.abc import Awaitable, Callable, Collection
-from pathlib import Path
+from collections.abc import Callable, Collection
 from random import SystemRandom
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from sdrlinkd.calls import (
     ACTION,
@@ -26,7 +26,14 @@ from sdrlinkd.calls import (
     calls_name,
     understood,
 )
-from sdrlinkd.client import AsyncPublisher, MessageRefusedError, NoDaemonError, RefusedError
+from sdrlinkd.client import (
+    UNKNOWN_TOPIC,
+    AsyncPublisher,
+    MessageRefusedError,
+    NoDaemonError,
+    RefusedError,
+)
+from sdrlinkd.daemon_side import DaemonSide
 from sdrlinkd.fleet.ros.attachment import Attachment
 from sdrlinkd.fleet.ros.graph import Graph
 from sdrlinkd.fleet.ros.names import (
@@ -48,11 +55,7 @@ MOST_ASKED = 64
 """Calls that are under way at a time, and as many to cancel; further ones are not taken."""
 MOST_RESULTS = 512
 """The same of calls for results, which take as long as the action."""
-UNKNOWN_TOPIC = "tx_unknown_topic"
 NOT_TAKEN = "calls_not_taken"
-
-Ask = Callable[[str, dict[str, Any] | None], Awaitable[Any]]
-"""Asks the daemon a verb, with its arguments."""
 
 _log = logging.getLogger(__name__)
 
@@ -67,18 +70,18 @@ class _Asked(NamedTuple):
 class Calls:
     """Serves what robots offer, and asks them over the daemon.
 
-    `patterns`: the services, or actions, that may be called. `ask` asks the daemon.
-    `leads`: whether this gateway leads for a robot at this moment.
+    `patterns`: the services, or actions, that may be called. `leads`:
+    whether this gateway leads for a robot at this moment.
     """
 
     def __init__(
-        self, graph: Graph, session: Session, patterns: list[str], ask: Ask,
+        self, graph: Graph, session: Session, patterns: list[str], daemon: DaemonSide,
         leads: Callable[[int], bool],
     ) -> None:  # fmt: skip
         self._graph = graph
         self._session = session
         self._patterns = patterns
-        self._ask_daemon = ask
+        self._daemon = daemon
         self._leads = leads
         self._asker = Asker(secrets.randbits(32), SystemRandom())
         self._asked: dict[int, _Asked] = {}
@@ -127,38 +130,38 @@ class Calls:
         if ended is not None:
             self._end(ended)
 
-    async def run(self, directory: Path | str | None) -> None:
+    async def run(self, out: AsyncPublisher) -> None:
         """Send what is due over the daemon, forever."""
         while True:
-            try:
-                async with AsyncPublisher(runtime_dir=directory) as out:
-                    while True:
-                        await self._turn(out)
-            except NoDaemonError:
-                self._reached.clear()
-                await asyncio.sleep(LOOK_S)
+            await self._turn(out)
 
     async def _turn(self, out: AsyncPublisher) -> None:
-        await self._reach({robot for robot, _ in self._proxies})
+        """Send what is due, and wait until there is more to do."""
         now = time.monotonic()
         for ended in self._asker.expired(now):
             self._end(ended)
         for sent in self._asker.due(now):
             await self._send(out, sent)
-        if self._asked:
-            await asyncio.sleep(BUSY_S)
-            return
-        await self._news.wait()
+        is_reached = await self._reach({robot for robot, _ in self._proxies})
+        with contextlib.suppress(TimeoutError):
+            wait_s = BUSY_S if self._asked else None if is_reached else LOOK_S
+            await asyncio.wait_for(self._news.wait(), wait_s)
         self._news.clear()
 
-    async def _reach(self, robots: set[int]) -> None:
-        """Have the daemon know the topics of calls to `robots`, so that they can answer."""
+    async def _reach(self, robots: set[int]) -> bool:
+        """Have the daemon know the topics of calls to `robots`, so that they can answer.
+
+        False while it is away.
+        """
         for robot in robots - self._reached:
             try:
-                await self._ask_daemon("declare", {"name": _bus_name(robot), "type": CALL_TYPE})
+                await self._daemon.ask("declare", {"name": _bus_name(robot), "type": CALL_TYPE})
+            except NoDaemonError:
+                return False
             except RefusedError as error:
                 _log.warning("robot %d cannot be called: %s", robot, error)
             self._reached.add(robot)
+        return True
 
     async def _send(self, out: AsyncPublisher, sent: Sent) -> None:
         robot, packet = sent

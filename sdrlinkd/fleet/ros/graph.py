@@ -38,8 +38,8 @@ class Graph:
         self.version = 0
         """Counts the changes of what others have."""
         self._others: dict[str, Endpoint] = {}
-        self._wanted: Counter[tuple[str, str, str]] = Counter()
-        """Subscriptions by (topic, type as in DDS, hash)."""
+        self._wanted: dict[tuple[str, str], Counter[str]] = {}
+        """Subscriptions by hash, by (topic, type as in DDS)."""
 
     def start(self) -> None:
         """Appear in the graph, and follow it."""
@@ -54,7 +54,7 @@ class Graph:
 
     def hashes(self, name: str, kind: str) -> list[str]:
         """The hashes that subscriptions to a topic know its type by."""
-        return [each[2] for each in self._wanted if each[:2] == (name, kind)]
+        return list(self._wanted.get((name, kind), ()))
 
     def published(self) -> set[tuple[str, str, str]]:
         """(topic, type as in DDS, hash) of the publishers of nodes that are no gateways."""
@@ -78,7 +78,10 @@ class Graph:
 
     def _count(self, endpoint: Endpoint, by: int) -> None:
         if endpoint.role is Role.SUBSCRIPTION:
-            key = (endpoint.name, endpoint.kind, endpoint.hash)
-            self._wanted[key] += by
-            if not self._wanted[key]:
-                del self._wanted[key]
+            topic = endpoint.name, endpoint.kind
+            wanted = self._wanted.setdefault(topic, Counter())
+            wanted[endpoint.hash] += by
+            # Unary plus drops what has come to zero.
+            self._wanted[topic] = +wanted
+            if not self._wanted[topic]:
+                del self._wanted[topic]

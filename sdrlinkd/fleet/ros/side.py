@@ -5,10 +5,11 @@ import contextlib
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
 from typing import NamedTuple
 
+from sdrlinkd.adapters import knows
 from sdrlinkd.calls import (
+    ACTION,
     DIRECTORY,
     FEEDBACK,
     INNER,
@@ -19,13 +20,14 @@ from sdrlinkd.calls import (
     feedback_type,
     of_action,
 )
-from sdrlinkd.client import Message, NoDaemonError, RefusedError
+from sdrlinkd.client import AsyncPublisher, Message, NoDaemonError, RefusedError
 from sdrlinkd.config import Setup
+from sdrlinkd.daemon_side import DaemonSide
 from sdrlinkd.fleet.formats import Command
 from sdrlinkd.fleet.heard_robot import HeardRobot, Upward
 from sdrlinkd.fleet.keys import TopicKey
 from sdrlinkd.fleet.ros.attachment import Attachment
-from sdrlinkd.fleet.ros.calls import Ask, Calls
+from sdrlinkd.fleet.ros.calls import Calls
 from sdrlinkd.fleet.ros.graph import Graph, Opened
 from sdrlinkd.fleet.ros.names import Qos, Role, at_robot, read_data_key, robot_in, ros_type
 from sdrlinkd.fleet.ros.topics import ENCODING, About, Topics
@@ -55,22 +57,23 @@ class FromRos(NamedTuple):
 class RosSide:
     """A gateway as a node of a ROS graph in `domain`.
 
-    `ask` asks its daemon; `leads`: whether it leads for a robot at this moment.
+    `leads`: whether it leads for a robot at this moment.
     """
 
     def __init__(
-        self, session: Session, setup: Setup, domain: int, ask: Ask, leads: Callable[[int], bool]
-    ) -> None:
+        self, session: Session, setup: Setup, domain: int, daemon: DaemonSide,
+        leads: Callable[[int], bool],
+    ) -> None:  # fmt: skip
         own_id, down = setup.node_id, setup.config.fleet.down
         self._session = session
         self._setup = setup
         self._domain = domain
         self._own_id = own_id
         self._down = down
-        self._ask = ask
+        self._daemon = daemon
         self._graph = Graph(session, domain, own_id)
         self._topics = Topics(self._graph, session)
-        self._calls = Calls(self._graph, session, down, ask, leads)
+        self._calls = Calls(self._graph, session, down, daemon, leads)
         self._served_after_s = setup.config.fleet.lease_s + SETTLED_S
         self._about: dict[TopicKey, About] = {}
         """What robots say of their topics."""
@@ -83,12 +86,14 @@ class RosSide:
 
     def start(self) -> None:
         """Appear in the graph."""
+        # The first look loads all types, so not when a message has come.
+        knows("")
         self._graph.start()
 
-    async def run(self, directory: Path | str | None) -> None:
+    async def run(self, publisher: AsyncPublisher) -> None:
         """Make calls over the daemon, and learn what robots say of their topics, forever."""
         async with asyncio.TaskGroup() as group:
-            group.create_task(self._calls.run(directory))
+            group.create_task(self._calls.run(publisher))
             group.create_task(self._learn())
 
     @property
@@ -179,8 +184,8 @@ class RosSide:
     def _put(self, told: TopicKey, item: Upward, about: About) -> None:
         passed = item.passed
         sent_ns = time.time_ns() - 1_000 * (passed.age or 0) if passed.tl is None else passed.tl
-        name = at_robot(told.robot, f"/{told.topic}")
-        self._topics.put(name, passed.ty, item.payload, sent_ns, item.qos, about)
+        name, qos = f"/{told.topic}", item.qos
+        self._topics.put(told.robot, name, passed.ty, item.payload, sent_ns, qos, about)
 
     async def _learn(self) -> None:
         """Ask what robots say of their topics when there is a new one."""
@@ -193,7 +198,7 @@ class RosSide:
                     TopicKey(each["robot"], each["name"]): About(
                         each["latched"], each["best_effort"], each["hash"]
                     )
-                    for each in await self._ask("declared", None)
+                    for each in await self._daemon.ask("declared")
                 }
             for told, item in [self._waiting.popleft() for _ in range(len(self._waiting))]:
                 self._put(told, item, self._about.setdefault(told, NOTHING))
@@ -219,7 +224,7 @@ class RosSide:
             return
         is_status = topic == STATUS
         kind = STATUS_TYPE if is_status else feedback_type(service)
-        name = at_robot(robot, f"{found.action}/_action/{topic.removeprefix(INNER)}")
+        name = f"{found.action}{ACTION}{topic.removeprefix(INNER)}"
         sent_ns = time.time_ns() - 1_000 * (message.age_us or 0)
         about = About(latched=int(is_status), is_best_effort=not is_status)
-        self._topics.put(name, kind, found.cdr, sent_ns, "latency", about)
+        self._topics.put(robot, name, kind, found.cdr, sent_ns, "latency", about)

@@ -60,22 +60,27 @@ class Topics:
     def __init__(self, graph: Graph, session: Session) -> None:
         self._graph = graph
         self._session = session
-        self._topics: dict[tuple[str, str], _Topic] = {}
+        self._topics: dict[int, dict[tuple[str, str], _Topic]] = {}
+        """By robot, and by name there and type."""
 
     def put(
-        self, name: str, kind: str, payload: bytes, sent_ns: int, qos: str, about: About
-    ) -> None:
-        """Put a message of topic `name` of type `kind`, sent at `sent_ns` in ns since 1970.
+        self, robot: int, name: str, kind: str, payload: bytes, sent_ns: int, qos: str,
+        about: About,
+    ) -> None:  # fmt: skip
+        """Put a message of a robot's topic `name` of type `kind`.
 
-        `qos` is the class that sets Zenoh's priority.
+        It was sent at `sent_ns`, in ns since 1970. `qos` is the class that sets Zenoh's priority.
         """
-        topic = self._topics.get((name, kind))
+        topics = self._topics.get(robot, {})
+        topic = topics.get((name, kind))
         if topic is not None and topic.about != about:
-            self._close(name, kind)
+            _take_down(topics.pop((name, kind)))
             topic = None
-        topic = topic or self._open(name, kind, qos, about)
         if topic is None:
-            return
+            topic = self._open(at_robot(robot, name), kind, qos, about)
+            if topic is None:
+                return
+            self._topics.setdefault(robot, {})[name, kind] = topic
         topic.n_put += 1
         attachment = Attachment(topic.n_put, sent_ns, topic.opened.gid).build()
         for hash_ in self._hashes(topic):
@@ -83,19 +88,13 @@ class Topics:
 
     def close(self, robot: int) -> None:
         """Take down the topics of a robot, and what is kept of them."""
-        beginning = at_robot(robot, "/")
-        for name, kind in [each for each in self._topics if each[0].startswith(beginning)]:
-            self._close(name, kind)
-
-    def _close(self, name: str, kind: str) -> None:
-        topic = self._topics.pop((name, kind))
-        topic.opened.close()
-        for put in topic.puts.values():
-            put.end()
+        for topic in self._topics.pop(robot, {}).values():
+            _take_down(topic)
 
     def _open(self, name: str, kind: str, qos: str, about: About) -> _Topic | None:
         dds = dds_type(kind)
-        if not dds or not is_name(name) or len(self._topics) >= MOST_TOPICS:
+        is_full = sum(map(len, self._topics.values())) >= MOST_TOPICS
+        if not dds or not is_name(name) or is_full:
             return None
         hash_ = type_hash(kind)
         if about.hash and not hash_.removeprefix("RIHS01_").startswith(about.hash):
@@ -104,8 +103,7 @@ class Topics:
         depth = about.latched or 10
         profile = Qos(about.is_best_effort, bool(about.latched), depth)
         opened = self._graph.open(Role.PUBLISHER, name, dds, hash_ or UNKNOWN_HASH, profile)
-        topic = self._topics[name, kind] = _Topic(name, dds, about, qos, opened, hash_)
-        return topic
+        return _Topic(name, dds, about, qos, opened, hash_)
 
     def _hashes(self, topic: _Topic) -> list[str]:
         """The hashes under which subscriptions expect a topic."""
@@ -125,3 +123,9 @@ class Topics:
                 key, topic.qos, ENCODING, topic.about.latched
             )
         return put
+
+
+def _take_down(topic: _Topic) -> None:
+    topic.opened.close()
+    for put in topic.puts.values():
+        put.end()
