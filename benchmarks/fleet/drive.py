@@ -4,12 +4,15 @@ import asyncio
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import zenoh
+
 from benchmarks.absent import PeerError
 from benchmarks.fleet.field import ROBOT, Field
+from benchmarks.peers.plain_zenoh import KEY, plain_config
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.fleet import FleetClient
 
@@ -27,6 +30,8 @@ class Drive:
     sent_at: dict[int, float] = field(default_factory=dict)
     at_gateways: dict[int, dict[int, float]] = field(default_factory=dict)
     at_operator: dict[int, list[float]] = field(default_factory=dict)
+    put_by: dict[int, int] = field(default_factory=dict)
+    """The gateway that put what came first at the operator; unknown for plain bridges."""
     duplicates: int = 0
     """Second copies that the operator's library dropped."""
 
@@ -43,10 +48,18 @@ class Drive:
         """When a message that was heard came to the first gateway's consumers."""
         return min(each[number] for each in self.at_gateways.values() if number in each)
 
-    def added_ms(self) -> list[float]:
+    def late_ms(self) -> list[float]:
         """How much later than there each message was at the operator, in the order of sending."""
         both = sorted(self.heard & set(self.at_operator))
         return [1e3 * (self.at_operator[number][0] - self.first_at(number)) for number in both]
+
+    def added_ms(self) -> list[float]:
+        """How much later each message was at the operator than at its gateway's own consumers."""
+        return [
+            1e3 * (at[0] - self.at_gateways[self.put_by[number]][number])
+            for number, at in sorted(self.at_operator.items())
+            if number in self.at_gateways.get(self.put_by.get(number, -1), {})
+        ]
 
 
 def message(number: int, size: int = SIZE) -> bytes:
@@ -68,8 +81,7 @@ async def drive(
         for gateway in where.gateways:
             told = found.at_gateways[gateway] = {}
             stack.enter_context(_listening(where.folders[gateway], told))
-        async with FleetClient(where.params) as operator:
-            hearing = asyncio.ensure_future(_hear(operator, found))
+        async with _operator(where, found):
             await asyncio.sleep(SETTLED_S)
             begin = time.monotonic()
             with Publisher(runtime_dir=where.folders[ROBOT]) as out:
@@ -79,18 +91,45 @@ async def drive(
                     found.sent_at[number] = time.monotonic()
                     out.send(f"/robot_{ROBOT}/odom", message(number))
             await asyncio.sleep(QUIET_S)
-            hearing.cancel()
-            found.duplicates = operator.duplicates
     if not found.at_operator:
         raise PeerError("nothing came to the operator")
     return found
 
 
+@contextlib.asynccontextmanager
+async def _operator(where: Field, found: Drive) -> AsyncIterator[None]:
+    """Notes what comes at the operator."""
+    if where.are_plain:
+        with plain_operator(where.endpoint, found.at_operator):
+            yield
+        return
+    async with FleetClient(where.params) as operator:
+        hearing = asyncio.ensure_future(_hear(operator, found))
+        yield
+        hearing.cancel()
+        found.duplicates = operator.duplicates
+
+
 async def _hear(operator: FleetClient, found: Drive) -> None:
     async for each in operator:
         if each.topic == "odom" and not each.passed.again:
-            at = found.at_operator.setdefault(number_of(each.payload), [])
-            at.append(time.monotonic())
+            number = number_of(each.payload)
+            found.at_operator.setdefault(number, []).append(time.monotonic())
+            found.put_by.setdefault(number, each.passed.gw)
+
+
+@contextlib.contextmanager
+def plain_operator(endpoint: str, came: dict[int, list[float]]) -> Iterator[None]:
+    """Notes in `came` when each message of plain bridges came, in a thread of Zenoh's."""
+
+    def take(sample: zenoh.Sample) -> None:
+        number = number_of(sample.payload.to_bytes())
+        came.setdefault(number, []).append(time.monotonic())
+
+    with zenoh.open(plain_config(endpoint)) as session:
+        subscribed = session.declare_subscriber(KEY, take)
+        yield
+        subscribed.undeclare()  # type: ignore[no-untyped-call]
 
 
 @contextlib.contextmanager

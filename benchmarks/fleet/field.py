@@ -15,7 +15,7 @@ from sdrlinkd.process import Process
 
 ROBOT = 2
 FLEET = "bench"
-ROUTER, WAN = "benchmarks.peers.zenoh_router", "benchmarks.peers.wan"
+ROUTER, WAN, PLAIN = (f"benchmarks.peers.{each}" for each in ("zenoh_router", "wan", "plain_zenoh"))
 GUARD = (
     '{access_control: {enabled: true, default_permission: "allow", rules: [], subjects: [], '
     "policies: []}}"
@@ -35,6 +35,8 @@ class Field:
     gateways: dict[int, Process]
     router: Process | None
     """A router of its own; None: a gateway is the router."""
+    are_plain: bool
+    """Whether the gateways are plain bridges, without any of our rules."""
 
     @property
     def params(self) -> FleetParams:
@@ -60,12 +62,13 @@ def routed(endpoint: str) -> Iterator[Process]:
 
 @contextmanager
 def field(
-    losses: Mapping[int, float], seed: int, wan_ms: float = 0.0, *, routes: bool = False
-) -> Iterator[Field]:
+    losses: Mapping[int, float], seed: int, wan_ms: float = 0.0, *,
+    routes: bool = False, are_plain: bool = False,
+) -> Iterator[Field]:  # fmt: skip
     """Run the robot's daemon, and for each gateway, which loses so much of it, both its programs.
 
     The gateways are `wan_ms` away from the router. With `routes`, the first one is the router
-    itself. Raises PeerError.
+    itself; with `are_plain`, they are plain bridges to Zenoh. Raises PeerError.
     """
     endpoint = free_endpoint()
     far = free_endpoint() if wan_ms else endpoint
@@ -87,11 +90,24 @@ def field(
         air.loss = {(ROBOT, gateway): loss for gateway, loss in losses.items()}
         gateways = {}
         for gateway in losses:
-            config = started.folders[gateway].with_suffix(".toml")
-            gateways[gateway] = processes.start_module(
-                stack, f"gateway_{gateway}", "sdrlinkd.cli.gateway", "--config", str(config)
-            )
-        yield Field(air, endpoint, far, started.folders, gateways, router)
+            folder = started.folders[gateway]
+            gateways[gateway] = (
+                start_plain(stack, gateway, folder, far)
+                if are_plain
+                else processes.start_module(
+                    stack, f"gateway_{gateway}", "sdrlinkd.cli.gateway",
+                    "--config", str(folder.with_suffix(".toml")),
+                )
+            )  # fmt: skip
+        yield Field(air, endpoint, far, started.folders, gateways, router, are_plain)
+
+
+def start_plain(stack: ExitStack, gateway: int, folder: Path, endpoint: str) -> Process:
+    """A plain bridge from a gateway's daemon to the router at an endpoint, once it listens."""
+    arguments = (str(folder), f"/rx_robot_{ROBOT}/odom", endpoint)
+    process = processes.start_module(stack, f"plain_{gateway}", PLAIN, *arguments)
+    process.line()
+    return process
 
 
 @contextmanager

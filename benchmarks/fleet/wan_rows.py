@@ -1,23 +1,18 @@
 """Two gateways over a wide-area network, beside a plain bridge to Zenoh over the same one."""
 
 import asyncio
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 
 import numpy as np
-import zenoh
 
-from benchmarks import processes
-from benchmarks.fleet.drive import drive, number_of
-from benchmarks.fleet.field import ROBOT, field
-from benchmarks.peers.plain_zenoh import KEY, plain_config
+from benchmarks.fleet.drive import drive, plain_operator
+from benchmarks.fleet.field import field, start_plain
 from benchmarks.report import Row
 
 PERIOD_S = 0.02
 LOSSES = {7: 0.06, 8: 0.22}
 WAN_MS = 40.0
-PLAIN = "benchmarks.peers.plain_zenoh"
 
 
 def rows(seed: int, quick: bool) -> Iterator[Row]:
@@ -26,19 +21,11 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
     came: dict[int, list[float]] = {}
     with field(LOSSES, seed, WAN_MS) as where, ExitStack() as stack:
         for gateway in where.gateways:
-            arguments = (str(where.folders[gateway]), f"/rx_robot_{ROBOT}/odom", where.far_endpoint)
-            processes.start_module(stack, f"plain_{gateway}", PLAIN, *arguments).line()
-        session = stack.enter_context(zenoh.open(plain_config(where.endpoint)))
-
-        def take(sample: zenoh.Sample) -> None:
-            number = number_of(sample.payload.to_bytes())
-            came.setdefault(number, []).append(time.monotonic())
-
-        subscribed = session.declare_subscriber(KEY, take)
+            start_plain(stack, gateway, where.folders[gateway], where.far_endpoint)
+        stack.enter_context(plain_operator(where.endpoint, came))
         found = asyncio.run(drive(where, n, PERIOD_S))
-        subscribed.undeclare()  # type: ignore[no-untyped-call]
     ours, plain = (
-        found.added_ms(),
+        found.late_ms(),
         [1e3 * (at[0] - found.first_at(number)) for number, at in came.items()],
     )
     note = f"two gateways, each {WAN_MS:g} ms from the router; 724 B at 50 Hz"
