@@ -72,7 +72,7 @@ class Forwarding(Generic[T]):
         at: Key = (key,)
         known = self._known.find(at, name, now)
         if known is None:
-            known = _Known[T](heard_at=now)
+            known = _Known(heard_at=now)
             self._known.add(at, name, known, now)
         elif known.heard_at is not None:
             return Turn.PAST
@@ -86,7 +86,8 @@ class Forwarding(Generic[T]):
             known.is_put = True
             return Turn.OURS
         known.item = item
-        self._held.append((now + self.hold_s * (1 + self.rank), known))
+        # Whoever goes before this one has waited, and its put takes as long as the leader's.
+        self._held.append((now + self.hold_s * (1 + self.rank / HELD_FOR), known))
         return Turn.LATER
 
     def is_known(self, key: Hashable, name: MessageName, now: float) -> bool:

@@ -247,8 +247,11 @@ class Session:
             actions = [self._waiting.popleft() for _ in range(n)]
             self._is_draining = n > 0
         for action in actions:
-            # By the loop, so that one that fails is logged and does not stop the others.
-            self._loop.call_soon(action)
+            try:
+                action()
+            except Exception as error:
+                told = {"message": "a callback of Zenoh's failed", "exception": error}
+                self._loop.call_exception_handler(told)
         if actions:
             self._loop.call_soon(self._drain)
 
