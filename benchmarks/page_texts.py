@@ -19,11 +19,14 @@ TEXTS = {
     "fleet": (
         "Real daemons, gateways and a Zenoh router on one machine. An air of PDUs carries what the "
         "robot sends, 724 B at 100 Hz, and loses it for each gateway by chance: 6, 22 and 40 %. "
-        "*lost_by*: messages that a gateway's daemon handed over and the operator never got.\n\n"
-        "The rows `wan_...` have a network of 40 ms between gateways and router. *plain_zenoh* "
-        "puts what each daemon hears as it comes, over the same network at the same time. Our "
-        "gateways bring one copy of each message, so one that the leader missed waits for the "
-        "other gateway."
+        "*lost_by*: messages that a gateway's daemon handed over and the operator never got. "
+        "*added*: from the consumers at the daemon whose gateway put a message to the operator's "
+        "program; *since_the_first_gateway*: from those of whichever daemon came first. "
+        "*plain_zenoh* puts what each daemon hears as it comes, with the same losses, right after. "
+        "In parentheses: on a machine where plain Zenoh adds 0.37 ms.\n\n"
+        "The rows `wan_...` have a network of 40 ms between gateways and router; plain Zenoh uses "
+        "it at the same time. Our gateways bring one copy of each message, so one that the leader "
+        "missed waits for the other gateway."
     ),
     "team": (
         "Real links on an air of bursts in virtual time, half duplex, 5 Msps, 16QAM 1/2, 25 dB: "
