@@ -78,6 +78,14 @@ def test_what_is_not_safe_or_not_there_is_refused(params, said, tmp_path):
         make_zenoh_config(FleetParams(**params), tmp_path)
 
 
+def test_no_memory_is_shared(tmp_path):
+    """A hardened service may not lock it; what a file of Zenoh says does not count."""
+    (tmp_path / "zenoh.json5").write_text("{transport: {shared_memory: {enabled: true}}}")
+    for file in ("", "zenoh.json5"):
+        config = make_zenoh_config(FleetParams(name="mine", zenoh=file), tmp_path)
+        assert config.get_json("transport/shared_memory/enabled") == "false"
+
+
 def test_tls_or_access_control_will_do(tmp_path):
     make_zenoh_config(FleetParams(down=["cmd_vel"], connect=["tls/a:1", "quic/b:2"]), tmp_path)
     (tmp_path / "acl.json5").write_text("{access_control: {enabled: true}}")
