@@ -12,8 +12,9 @@ from sdrlinkd.fleet.names import Key, NamedRecently
 FIRST_HOLD_S = 0.02
 LEAST_HOLD_S = 0.002
 MOST_HOLD_S = 0.5
-HELD_FOR = 1.5
-"""A copy is held for so many times what nearly all of the leader's puts took."""
+LEAST_MARGIN_S = 0.001
+MOST_MARGIN = 0.5
+"""Of what nearly all of the leader's puts took."""
 NEARLY_ALL = 0.95
 REMEMBERED = 64
 """The leader's last puts of which the delay is remembered."""
@@ -54,6 +55,8 @@ class Forwarding(Generic[T]):
         self._known: NamedRecently[_Known[T]] = NamedRecently()
         self._held: deque[tuple[float, _Known[T]]] = deque()
         self._delays: deque[float] = deque(maxlen=REMEMBERED)
+        self._usual_s = FIRST_HOLD_S / 2
+        """What nearly all of the leader's last puts took."""
         self.hold_s = FIRST_HOLD_S
         self.rank = 0
         """Gateways besides the leader that put before this one what the leader missed."""
@@ -87,7 +90,7 @@ class Forwarding(Generic[T]):
             return Turn.OURS
         known.item = item
         # Whoever goes before this one has waited, and its put takes as long as the leader's.
-        self._held.append((now + self.hold_s * (1 + self.rank / HELD_FOR), known))
+        self._held.append((now + self.hold_s + self.rank * self._usual_s, known))
         return Turn.LATER
 
     def is_known(self, key: Hashable, name: MessageName, now: float) -> bool:
@@ -151,5 +154,8 @@ class Forwarding(Generic[T]):
         """Learn how much later than we hear a message the leader's put of it arrives."""
         self._delays.append(max(0.0, passed_at - heard_at))
         ordered = sorted(self._delays)
-        usual_s = ordered[int(NEARLY_ALL * (len(ordered) - 1))]
-        self.hold_s = min(MOST_HOLD_S, max(LEAST_HOLD_S, HELD_FOR * usual_s))
+        usual_s = self._usual_s = ordered[int(NEARLY_ALL * (len(ordered) - 1))]
+        # Over a steady network, however slow, a put that is later than these is rare.
+        spread_s = usual_s - ordered[len(ordered) // 2]
+        margin_s = min(MOST_MARGIN * usual_s, max(LEAST_MARGIN_S, spread_s))
+        self.hold_s = min(MOST_HOLD_S, max(LEAST_HOLD_S, usual_s + margin_s))

@@ -111,6 +111,15 @@ def test_a_copy_is_held_for_longer_where_the_leader_is_far():
     assert twice == gateways.each[1].put_twice
 
 
+def test_over_a_steady_network_it_is_held_for_little_longer_than_the_leader_needs():
+    rng = Random(7)
+    gateways = Gateways([0.9, 0.9], lambda: rng.uniform(0.08, 0.082))
+    run(gateways)
+    assert 0.08 < gateways.each[1].hold_s < 0.085
+    # At first, nobody knows how slow it is.
+    assert gateways.each[1].put_twice <= 20
+
+
 def test_those_that_wait_for_the_leader_do_not_learn_from_each_other():
     rng = Random(6)
     gateways = Gateways([0.7, 0.8, 0.8, 0.8], lambda: rng.uniform(0.0002, 0.001))
