@@ -69,14 +69,8 @@ class Booted:
 
     def _entered(self, line: str) -> list[str]:
         spaces = ("--mount", "--uts", "--ipc", "--net", "--pid", "--cgroup", "--root", "--wd")
-        environment = (
-            "env",
-            "-i",
-            "PATH=/usr/sbin:/usr/bin:/sbin:/bin",
-            "LANG=C.UTF-8",
-            "HOME=/root",
-        )
-        return ["nsenter", f"--target={self._init}", *spaces, *environment, "sh", "-e", "-c", line]
+        clean = ("env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "LANG=C.UTF-8", "HOME=/root")
+        return ["nsenter", f"--target={self._init}", *spaces, *clean, "sh", "-e", "-c", line]
 
 
 def lacking() -> str:
