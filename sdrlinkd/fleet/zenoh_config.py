@@ -39,7 +39,7 @@ def make_zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
     if params.ros_domain is not None:
         # Where values are kept for subscribers that come later, Zenoh needs times.
         config.insert_json5("timestamping/enabled", "true")
-    # Whoever is reached is on another host; and a hardened service may not lock memory.
+    # Messages are small, and Zenoh locks what it shares, which a hardened service may not do.
     config.insert_json5("transport/shared_memory/enabled", "false")
     # `open_session` tries again by itself, as a thread that waits in Zenoh cannot be stopped.
     config.insert_json5("connect/timeout_ms", "0")

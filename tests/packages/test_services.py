@@ -42,6 +42,7 @@ def robot(installed, deb, endpoint, tmp_path_factory):
         yield booted
     finally:
         booted.stop()
+        shutil.rmtree(debian.path)
 
 
 def pid_of(robot, unit):
@@ -56,7 +57,7 @@ def wait_until_active(robot, units=ALL):
 
 
 def test_the_daemon_is_up_and_people_of_its_group_can_use_it(robot):
-    assert "\nradio  direct up" in robot.run("sdrlinkctl status")
+    wait_for(lambda: "\nradio  direct up" in robot.answer("sdrlinkctl status"), 60)
     robot.run(as_user("robot", "sdrlinkctl status"))
     robot.run(as_user("robot", "SDRLINKD_RUNTIME_DIR=/run/sdrlinkd-two sdrlinkctl status"))
 
