@@ -263,6 +263,8 @@ MISSED = {
 }  # fmt: skip
 # Rows of recordings that are not available everywhere.
 OPTIONAL = {"ptp_over_wifi_strays_ms"}
+# These take a few seconds; the others are for the long tier.
+SMALL = {"access", "repeats", "sealing", "phy_per"}
 # Why a benchmark cannot run here, if so.
 LACKING = {"radio": no_test_radio, "flowgraphs": no_gnu_radio, "adapters": no_rclpy}
 # Peers take long, and need the machine to themselves.
@@ -291,8 +293,9 @@ def test_every_benchmark_is_in_the_list():
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(500)
-@pytest.mark.parametrize("name", ROWS)
+@pytest.mark.parametrize(
+    "name", [n if n in SMALL else pytest.param(n, marks=pytest.mark.long) for n in ROWS]
+)
 def test_a_benchmark_prints_its_rows(name):
     if reason := LACKING.get(name, str)():
         pytest.skip(reason)

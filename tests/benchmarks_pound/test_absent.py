@@ -76,7 +76,7 @@ def test_a_peer_that_does_not_start_is_named_and_costs_no_row(monkeypatch, capsy
     assert "Traceback" not in err
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_daemons_that_do_not_start_cost_their_own_rows_only(monkeypatch, capsys):
     """The first pair of daemons ends at once; the one daemon works, until its second pass."""
     made = []
@@ -107,8 +107,7 @@ def test_daemons_that_do_not_start_cost_their_own_rows_only(monkeypatch, capsys)
     assert "rate_hz" in absent.told()["two daemons and an outage"]
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(250)
+@pytest.mark.long
 @in_namespaces
 def test_the_whole_benchmark_goes_on_without_a_peer(monkeypatch, capsys, broken_zenoh):
     monkeypatch.setattr(beside, "QUICK", ("zenoh_drop", "tcp_nodelay"))

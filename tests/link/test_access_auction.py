@@ -19,6 +19,7 @@ LONGEST_S = 0.004
 SHORT_S = 0.0005
 SETTLED_S = 1.5
 """Until then, robots do not know whether they have missed something."""
+MANY = pytest.param(24, marks=pytest.mark.long)
 
 
 def make_air(n, seed, **more):
@@ -43,7 +44,7 @@ def send_at_random(air, node, qos, until_s, per_s=20.0):
         air.offer(node, at, qos, SHORT_S)
 
 
-@pytest.mark.parametrize("n", [2, 3, 8, 24])
+@pytest.mark.parametrize("n", [2, 3, 8, MANY])
 def test_bursts_never_overlap_whoever_sends_whatever(n):
     for seed in range(3):
         air = make_air(n, seed)
@@ -54,7 +55,7 @@ def test_bursts_never_overlap_whoever_sends_whatever(n):
         assert not any(node.waiting for node in air.nodes.values())
 
 
-@pytest.mark.parametrize("n", [2, 8, 24])
+@pytest.mark.parametrize("n", [2, 8, pytest.param(24, marks=pytest.mark.slow)])
 def test_a_quiet_hand_over_takes_two_mini_slots_and_all_have_the_same_share(n):
     air = make_air(n, 1)
     air.saturate(900 // n, qos=Qos.BULK)
@@ -67,7 +68,7 @@ def test_a_quiet_hand_over_takes_two_mini_slots_and_all_have_the_same_share(n):
     assert max(counts.values()) - min(counts.values()) <= 1
 
 
-@pytest.mark.parametrize("n", [3, 8, 24])
+@pytest.mark.parametrize("n", [3, 8, MANY])
 @pytest.mark.parametrize(
     ("most", "one"),
     [
@@ -103,7 +104,7 @@ def test_several_urgent_ones_at_once_wait_for_each_other_only():
     air.assert_nobody_clashes()
 
 
-@pytest.mark.parametrize("n", [3, 8, 24])
+@pytest.mark.parametrize("n", [3, 8, MANY])
 @pytest.mark.parametrize("miss", [0.01, 0.1])
 def test_whoever_misses_a_burst_does_not_clash(n, miss):
     for seed in range(2):

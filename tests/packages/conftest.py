@@ -15,12 +15,11 @@ GIVEN = "SDRLINK_DEB"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """All of them are slow, and the first waits until the package is built."""
+    """All of them are long: they build packages and whole systems."""
     here = Path(__file__).parent
     for item in items:
         if here in item.path.parents:
-            item.add_marker(pytest.mark.slow)
-            item.add_marker(pytest.mark.timeout(900))
+            item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(scope="session")

@@ -71,7 +71,7 @@ def on_numba(monkeypatch):
         monkeypatch.setattr(compute, name, call, raising=False)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_library_computes_what_the_kernels_do_to_the_last_bit(monkeypatch):
     engine.use("compiled")
     ours = exactly(everything())
@@ -380,8 +380,7 @@ def test_arrays_that_may_not_be_written_and_empty_ones_are_taken():
     assert sense.next_index == 8
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.long
 def test_a_library_for_the_whole_family_computes_the_same(tmp_path, monkeypatch):
     engine.use("compiled")
     ours = everything()
@@ -419,8 +418,7 @@ def some_of_everything():
     receiver.flush()
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(900)
+@pytest.mark.long
 def test_kernels_for_64_bit_arm_repeat_recorded_calls(tmp_path, monkeypatch):
     """On an emulated processor: every kernel, with what it read and what it left here."""
     engine.use("compiled")

@@ -28,7 +28,7 @@ from tests.ros.team import (
 from tests.ros.wheels import environment, python
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.realtime, pytest.mark.long]
 
 OTHER_HASH = "RIHS01_" + "ab" * 32
 IMAGE = "sensor_msgs/msg/Image"

@@ -21,7 +21,7 @@ from tests.waiting import wait_for
 
 __all__ = ["air", "hub", "world"]
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500)]
+pytestmark = [pytest.mark.realtime, pytest.mark.long]
 
 DOMAIN, HASH = 42, f"RIHS01_{'ab' * 32}"
 ALLOW = ("-p", 'services.allow:=["/set", "/fibonacci", "/secret"]')

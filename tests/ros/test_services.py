@@ -11,7 +11,7 @@ from tests.ros.programs import Agent
 from tests.ros.team import WAIT_S, Robot, config
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500)]
+pytestmark = pytest.mark.realtime
 
 ALLOW = ("-p", 'services.allow:=["/set", "/fibonacci"]')
 SUCCEEDED, CANCELED = 4, 5
@@ -74,6 +74,7 @@ def test_200_calls_over_a_link_that_loses_a_fifth_are_each_executed_once(robots,
     )
 
 
+@pytest.mark.long
 def test_calls_in_an_outage_are_executed_once_or_not_at_all(robots, air):
     one, two = robots
     one.node.serve(name="/set")
@@ -95,6 +96,7 @@ def test_calls_in_an_outage_are_executed_once_or_not_at_all(robots, air):
         two.bridge.says("/set of robot 1: no answer came in time")
 
 
+@pytest.mark.long
 def test_an_action_survives_an_outage_in_its_middle_and_can_be_cancelled(robots, air):
     one, two = robots
     one.node.act(name="/fibonacci", step_s=1.0)
@@ -120,6 +122,7 @@ def test_an_action_survives_an_outage_in_its_middle_and_can_be_cancelled(robots,
     assert one.node.n_goals() == 2, "no goal was sent twice"
 
 
+@pytest.mark.long
 def test_what_cannot_be_called_is_said_and_ends_no_other(robots, start):
     one, two = robots
     one.node.serve(name="/set")

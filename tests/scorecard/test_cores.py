@@ -19,7 +19,7 @@ from tests.scorecard.helpers import CDR, own_rss_mib
 from tests.sealing.test_attacks import Commands, Recorder, judge, pair
 from tests.sealing.test_numbers import KEY, NEXT, Machine
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 OUTCOMES = (Outcome.SENT,) * 4 + (Outcome.LATE, Outcome.LOST)
 EVENTS = ("send", "send", "send", "time", "late", "disk", "restart", "anew")
