@@ -18,7 +18,8 @@ from tests.tiers import *
 from tests.watchdog import Limits
 tiers.MOST_S.update(quick=0.3, slow=0.8)
 tiers.SLOW_MACHINE = 1.0
-tiers.USUAL_LIMITS = Limits(cpu_s=2.0, idle_s=2.0, wall_s=4.0)
+tiers.slowness = lambda: 1.0
+tiers.USUAL_LIMITS = Limits(cpu_s=1.0, idle_s=2.0, wall_s=6.0)
 """
 FAULTS = """
 import subprocess, sys, time
@@ -99,7 +100,8 @@ def test_a_run_ends_in_time_and_names_each_item_that_is_at_fault(tmp_path):
     said = {
         "test_dear": "tier quick allows 0.3 s: make it cheaper, or mark it `slow`",
         "test_dear_by_a_child": "or mark it `",
-        "test_endless": "it computes for too long",
+        # On a busy machine, the clock may come first.
+        "test_endless": " too long: ",
         "test_idle": "it hangs: idle for",
         "test_ticking": "it takes too long",
         "test_leaves": "1 processes are left behind by test_faults.py::test_leaves",

@@ -28,9 +28,10 @@ REPLAY = Path(__file__).with_name("replay.c")
 
 
 @pytest.fixture(autouse=True)
-def _as_before():
-    """Use the best engine again after each test."""
+def _as_before(monkeypatch):
+    """Use the best engine again after each test, and what a test has put in its place no more."""
     yield
+    monkeypatch.undo()
     engine.use("auto")
 
 
@@ -177,7 +178,12 @@ def test_with_a_numba_that_fails_numpy_computes_and_says_why(
     assert not list(without_library.glob("*"))
 
 
-def test_a_build_can_be_given_up(without_library):
+def test_a_build_can_be_given_up(without_library, tmp_path, monkeypatch):
+    compiling = tmp_path / "compiling"
+    compiling.write_text("#!/bin/sh\necho 1\nexec sleep 600\n")
+    compiling.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(compiling))
+
     class GivenUpError(Exception):
         """Nobody waits any more."""
 
