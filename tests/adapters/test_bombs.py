@@ -30,7 +30,7 @@ def bomb():
     return zeros(GIGABYTES)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_chunk_of_an_mcap_file(tmp_path, bomb):
     """Within 2 GiB of memory, where the whole chunk would take 3."""
     name = b"zstd"

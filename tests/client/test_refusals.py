@@ -102,8 +102,7 @@ def test_send_refuses_in_the_daemons_words(start_daemon):
         wait_for(lambda says=says: daemon.snapshot().bus.bad_envelope_last == says)
 
 
-async def test_send_refuses_in_asyncio(start_daemon):
-    daemon = start_daemon()
+async def test_send_refuses_in_asyncio(daemon):
     async with AsyncPublisher(daemon.directory) as out:
         for wishes, says in WISHES:
             with pytest.raises(MessageRefusedError) as refused:
@@ -252,15 +251,12 @@ def test_never_blocking(start_daemon, stop, spawn_again, tmp_path):
 
 
 @pytest.mark.parametrize("make", [Publisher, AsyncPublisher])
-async def test_a_daemon_that_answers_but_takes_nothing_yet_is_waited_for(
-    start_daemon, tmp_path, make
-):
+async def test_a_daemon_that_answers_but_takes_nothing_yet_is_waited_for(daemon, tmp_path, make):
     """The two sockets connect one by one; a program that waited may send without blocking."""
 
     async def result(value):
         return await value if asyncio.iscoroutine(value) else value
 
-    daemon = start_daemon()
     (tmp_path / "out.sock").symlink_to(daemon.directory / "out.sock")
     out = make(tmp_path)
     try:
