@@ -227,6 +227,7 @@ async def test_a_rate_that_the_device_does_not_offer_is_refused():
         await radio(model="usrp").open(Tuning(RATE, 915e6))
 
 
+@pytest.mark.slow
 @needs_radio
 def test_a_probe_tells_what_devices_can_do_and_which_module_is_missing():
     (found,) = probe_devices("driver=loopback,model=hackrf").devices

@@ -53,6 +53,7 @@ def by_rosbags(folder):
         ]
 
 
+@pytest.mark.slow
 def test_a_bag_is_whole_between_any_two_writes(tmp_path, monkeypatch):
     """Whenever the recorder is killed, both readers read the same."""
     bag, looks = tmp_path / "bag", []
@@ -128,6 +129,7 @@ def test_what_is_recorded_outlives_the_recorder(start_daemon, tmp_path):
         assert played.wait(30) == 0
 
 
+@pytest.mark.slow
 @given(st.lists(st.sampled_from("ab+"), max_size=30), st.integers(0, 3000))
 def test_a_bag_is_whole_after_each_sync(tmp_path_factory, steps, max_bytes):
     folder = tmp_path_factory.mktemp("bags") / "bag"

@@ -109,6 +109,7 @@ def test_list_finds_a_daemon_wherever_its_directory_is(start_daemon, capsys):
     assert str(daemon.directory) not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_list_finds_a_directory_that_is_named_from_where_the_daemon_was_started(
     tmp_path, write_config, capsys
 ):

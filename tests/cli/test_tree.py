@@ -21,6 +21,7 @@ def one_line(text: str | None) -> str:
     return (text or "").partition("\n\n")[0]
 
 
+@pytest.mark.slow
 def test_every_command_is_listed_with_its_own_help():
     tree = typer.main.get_group(app)
     for name, listed in COMMANDS.items():

@@ -71,6 +71,7 @@ def test_the_page_of_benchmarks_is_that_of_what_is_kept():
     assert benchmarks_page.PAGE.read_text() == benchmarks_page.page(), "`make figures` writes it"
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn_of_what_is_kept(tmp_path, monkeypatch):
     for module in ("latency.pictures", "pound.pictures", "timesync.pictures", "phy_curves"):
         monkeypatch.setattr(f"benchmarks.{module}.FIGURES", tmp_path)
@@ -96,6 +97,7 @@ def printed(capsys, *words):
     return " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.slow
 def test_help_shows_keys_sections_pages_names_and_commands(capsys):
     assert "late-joiners" in printed(capsys)
     assert 'Takes one of "auction", "auto"' in printed(capsys, "access.policy")

@@ -154,6 +154,7 @@ def test_the_file_is_mcap_with_schemas(tmp_path):
     assert set(json.loads(message.data)) == set(json.loads(schema.data)["properties"])
 
 
+@pytest.mark.slow
 def test_the_page_has_everything_and_names_are_text(tmp_path):
     reports = [
         report(second, level="DEGRADED", reason=f"robot 2 hears us at {second} dB", name=HOSTILE)
