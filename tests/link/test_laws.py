@@ -104,6 +104,7 @@ def test_the_ledger_holds_at_every_step_of_any_run(seed):
     assert tx(link).queued == tx(link).in_flight == 0
 
 
+@pytest.mark.slow
 @law(30)
 @given(st.integers(0, 2**32))
 def test_whatever_the_air_does_nothing_is_made_up(seed):

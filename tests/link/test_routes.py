@@ -47,6 +47,7 @@ def of_others(air, robot):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dst", [4, BROADCAST])
 def test_a_chain_is_found_and_ages_stay_true(dst):
     air = mesh((1, 2), (2, 3), (3, 4))
@@ -63,6 +64,7 @@ def test_a_chain_is_found_and_ages_stay_true(dst):
     assert (1, BROADCAST) not in flows(air, 3)
 
 
+@pytest.mark.slow
 def test_where_all_hear_all_nothing_is_relayed_and_little_is_told():
     air = mesh(*combinations(range(1, 7), 2))
     air.run(3.0)
@@ -79,6 +81,7 @@ def test_where_all_hear_all_nothing_is_relayed_and_little_is_told():
         assert not any(isinstance(record, Route) for _, record in air.records(robot))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dst", [4, BROADCAST])
 @pytest.mark.parametrize("more", [(), ((2, 3),)])
 def test_a_relay_that_dies_is_gone_around_and_nothing_is_lost(dst, more):
@@ -104,6 +107,7 @@ def test_a_relay_that_dies_is_gone_around_and_nothing_is_lost(dst, more):
     assert flow.went_around == 1
 
 
+@pytest.mark.slow
 def test_a_relay_that_comes_back_is_used_if_it_is_needed():
     air = mesh((1, 2), (2, 3))
     air.run(2.5)
@@ -118,6 +122,7 @@ def test_a_relay_that_comes_back_is_used_if_it_is_needed():
     assert [n for n in air.numbers(3) if n >= 100] == list(range(100, 120))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dst", [3, BROADCAST])
 def test_the_only_relay_goes_on_though_its_answers_are_not_heard(dst):
     air = mesh((1, 2), (2, 3))
@@ -132,6 +137,7 @@ def test_the_only_relay_goes_on_though_its_answers_are_not_heard(dst):
     assert sorted(air.numbers(3)) == list(range(190))
 
 
+@pytest.mark.slow
 def test_a_far_robot_that_restarts_is_believed_though_its_numbers_begin_anew():
     air = mesh((1, 2), (2, 3))
     air.run(2.5)
@@ -187,6 +193,7 @@ def test_a_robot_that_is_not_named_forwards_nothing():
     assert two.audit() == []
 
 
+@pytest.mark.slow
 @law(40)
 @given(st.integers(0, 2**32))
 def test_in_any_mesh_everybody_gets_everything_once(seed):

@@ -104,6 +104,7 @@ def pair():
     return Team(Robot(1, [KEY], drift=4e-5), Robot(2, [KEY], drift=-4e-5))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("restarts", [False, True])
 @pytest.mark.parametrize(("make", "victim"), [(pair, 2), (chain, 3)])
 def test_recordings_gain_nothing(make, victim, restarts):
@@ -120,6 +121,7 @@ def test_recordings_gain_nothing(make, victim, restarts):
         assert robot.link.audit() == []
 
 
+@pytest.mark.slow
 def test_what_one_life_has_heard_no_other_one_hears_again():
     """A message that the recorder plays within its lifespan, to a robot that has just restarted."""
     team = pair()

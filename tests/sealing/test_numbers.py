@@ -1,5 +1,6 @@
 """No number twice, whatever happens to clocks, power and disk."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -117,6 +118,7 @@ def test_at_most_256_pdus_in_a_tick():
     assert len(machine.used) == 512
 
 
+@pytest.mark.slow
 def test_a_full_disk_stops_sealing_before_the_floor_and_says_so():
     team = Team(Robot(1, [KEY]), Robot(2, [KEY]))
     robot = team.robots[1]
