@@ -61,6 +61,8 @@ class Cost:
 class Suite:
     """What one process of a test run knows: its items' costs, their limits, what they leave."""
 
+    NAME = "sdrlink-suite"
+
     def __init__(self, config: pytest.Config) -> None:
         worker = getattr(config, "workerinput", None)
         self._name = f"{worker['testrunuid']}-{worker['workerid']}" if worker else str(os.getpid())
@@ -161,6 +163,10 @@ class Suite:
         finally:
             fcntl.flock(self._alone, fcntl.LOCK_UN)
 
+    def share(self, seconds: float) -> None:
+        """Do not charge this processor time to the item that runs: others have use of it, too."""
+        self._shared_s += seconds
+
     def _end_what_is_left(self) -> None:
         left = list(started_by(f"{RUN}={self._name}"))
         for pid, _ in left:
@@ -228,7 +234,7 @@ def pytest_configure(config: pytest.Config) -> None:
     # Tests that do not state how many examples they need.
     settings.register_profile("law", law())
     settings.load_profile("law")
-    config.pluginmanager.register(Suite(config), "sdrlink-suite")
+    config.pluginmanager.register(Suite(config), Suite.NAME)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
