@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import phy
-from phy.engine import files
+from phy.testing import files
 
 # numba does not see that the code of a called function has changed.
 _cache = Path(phy.__file__).parents[1] / "build" / "numba" / files.source_key()
