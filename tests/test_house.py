@@ -1,5 +1,6 @@
 """Rules of this project that no linter checks."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -116,3 +117,40 @@ def test_tests_of_the_link_enter_by_a_door():
     inside = re.compile(r"^\s*(?:from|import) sdrlinkd\.link\.\w+\.\w+", re.MULTILINE)
     past = [path for path in sources("tests", "benchmarks") if inside.search(path.read_text())]
     assert past == []
+
+
+PHY_DOORS = ("phy", "phy.engine", "phy.kernels", "phy.reference", "phy.testing", "phy.wifi")
+
+
+def offered_by(door):
+    """The names in a module's `__all__`; kernels are not imported, as that takes a second."""
+    path = ROOT / door.replace(".", "/")
+    text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+    offered = re.search(r"^__all__ = (\[.*?\])", text, re.MULTILINE | re.DOTALL)[1]
+    return ast.literal_eval(offered)
+
+
+def names_in(text, package):
+    """What a source names of a package: imported, used, or in a string, such as a program."""
+    dotted = rf"(?<![\w./]){package}(?:\.(?!__)[a-z_]\w*)*(?:\.[A-Z]\w*)?"
+    imports = rf"from ({dotted}) import (?:\(([^)]*)\)|([\w, ]+))"
+    for module, several, one in re.findall(imports, text):
+        yield from (f"{module}.{name}" for name in re.findall(r"(\w+)(?: as \w+)?", several or one))
+    # Another package may have a module of that name.
+    is_imported = re.search(rf"import {package}\b", text)
+    yield from re.findall(
+        dotted if is_imported else rf"(?<=[\"']){dotted}", re.sub(imports, "", text)
+    )
+
+
+def test_tests_of_phy_enter_by_a_door():
+    """So its inside can change without them; `phy.testing` offers them what nobody else needs."""
+    offered = {f"{door}.{name}" for door in PHY_DOORS for name in offered_by(door)}
+    named = {
+        (str(path.relative_to(ROOT)), name)
+        for path in sources("tests")
+        for name in names_in(path.read_text(), "phy")
+    }
+    past = {(path, name) for path, name in named if name not in {*PHY_DOORS, *offered}}
+    assert past == set()
+    assert len(named) > 300

@@ -47,7 +47,7 @@ def build(target: Target, to: Path, progress: Progress | None = None) -> None:
         raise BuildError("there is no C compiler: install gcc, or `pip install ziglang`")
     with tempfile.TemporaryDirectory(prefix="sdrlinkd-build-") as folder:
         made, linked = Path(folder) / "kernels.o", Path(folder) / "kernels.so"
-        _compile(target, made, progress)
+        compile_kernels(target, made, progress)
         made.with_name("kernels.h").write_text(library.header())
         sources = [f"-I{folder}", str(_CALLS), str(made)]
         _link([*compiler, *_OPTIONS, *sources, "-o", str(linked), "-lm"])
@@ -56,7 +56,8 @@ def build(target: Target, to: Path, progress: Progress | None = None) -> None:
         progress(N_STEPS, N_STEPS)
 
 
-def _compile(target: Target, to: Path, progress: Progress | None) -> None:
+def compile_kernels(target: Target, to: Path, progress: Progress | None = None) -> None:
+    """Compile the kernels for `target` into the object file `to`. Raises BuildError."""
     settings = {**os.environ, **_SETTINGS, "NUMBA_CACHE_DIR": str(to.parent)}
     settings["PYTHONPATH"] = os.pathsep.join((str(_ROOT), os.environ.get("PYTHONPATH", "")))
     command = [sys.executable, "-m", "phy.engine", target.name, str(to)]

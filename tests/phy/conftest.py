@@ -7,7 +7,7 @@ import pytest
 from numba.core.event import Event, Listener, install_listener
 
 import phy
-from phy.engine import files
+from phy.testing import files
 from tests.cost import spent_s
 from tests.tiers import Suite
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phy import BurstOver, PduHeard, Receiver, Transmitter, preamble
+from phy import BurstOver, PduHeard, Receiver, Transmitter
 from tests.laws import law
 from tests.phy.signals import endings, heard, noise, payloads, silence, turned
 
@@ -28,7 +28,7 @@ def make_stream(seed):
         if kind == "own":
             sent += pdus
         if kind == "false start":
-            burst = preamble.preamble()[: int(rng.integers(100, 353))]
+            burst = burst[: int(rng.integers(100, 353))]
         if kind == "cut short":
             burst = burst[: int(rng.integers(353, len(burst)))]
         strength = rng.uniform(0.5, 2)

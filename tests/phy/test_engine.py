@@ -1,9 +1,9 @@
 """The engines: what computes the modem, how its library is made, found, trusted and called."""
 
 import ctypes.util
-import importlib
 import importlib.util
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -16,10 +16,16 @@ import numpy as np
 import pytest
 
 import phy
-from phy import compute, engine
-from phy.engine import builder, choice, files, library, targets
-from phy.engine.entries import ENTRIES
-from phy.tables.block import ArgumentBlock
+from phy import engine, kernels
+from phy.testing import (
+    ENTRIES,
+    ArgumentBlock,
+    compile_kernels,
+    compute,
+    files,
+    library,
+    targets,
+)
 from tests.phy import golden_calls
 from tests.phy.signals import noise
 
@@ -63,11 +69,12 @@ def exactly(told):
 
 def on_numba(monkeypatch):
     """Have numba compile the kernels in this process, and call those."""
-    for name, entry in ENTRIES.items():
-        kernel = getattr(importlib.import_module(f"phy.kernels.{entry.module}"), name)
+    for name in ENTRIES:
 
-        def call(*given, kernel=kernel):
-            return kernel(*(x.packed if isinstance(x, ArgumentBlock) else x for x in given))
+        def call(*given, name=name):
+            return getattr(kernels, name)(
+                *(x.packed if isinstance(x, ArgumentBlock) else x for x in given)
+            )
 
         monkeypatch.setattr(compute, name, call, raising=False)
 
@@ -142,9 +149,9 @@ def test_an_unknown_engine_is_refused():
 
 @pytest.fixture
 def without_library(monkeypatch, tmp_path):
-    """No library anywhere, an empty folder for one, and no engine in use yet."""
-    monkeypatch.setattr(files, "_folders", lambda: iter([tmp_path / "libraries"]))
-    monkeypatch.setattr(choice, "_in_use", None)
+    """No library anywhere, an empty folder for one, and none in use."""
+    monkeypatch.setattr(files, "folders", lambda: iter([tmp_path / "libraries"]))
+    engine.use("numpy")
     return tmp_path / "libraries"
 
 
@@ -157,7 +164,6 @@ def test_without_a_c_compiler_numpy_computes_and_says_why(without_library, monke
     used = engine.use("auto")
     assert used.name == "numpy"
     assert "slow: no compiled modem: there is no C compiler: install gcc" in used.told
-    monkeypatch.setattr(choice, "_in_use", None)
     with pytest.raises(engine.EngineError, match="pip install ziglang"):
         engine.use("compiled")
 
@@ -196,8 +202,8 @@ def test_a_build_can_be_given_up(without_library, tmp_path, monkeypatch):
 
 
 def test_where_nothing_can_be_written_there_is_no_library(tmp_path, monkeypatch):
-    monkeypatch.setattr(builder.subprocess, "run", fake_compiler)
-    monkeypatch.setattr(builder, "_compile", lambda *_: None)
+    monkeypatch.setattr(sys, "executable", shutil.which("true"))
+    monkeypatch.setattr(subprocess, "run", fake_compiler)
     (tmp_path / "file").write_text("")
     with pytest.raises(engine.BuildError, match=r"file/modem\.so: "):
         engine.build(engine.this(), tmp_path / "file" / "modem.so")
@@ -215,7 +221,7 @@ def folder(tmp_path, monkeypatch):
     folder = tmp_path / "libraries"
     folder.mkdir(mode=0o755)
     shutil.copy(found, folder / found.name)
-    monkeypatch.setattr(files, "_folders", lambda: iter([folder]))
+    monkeypatch.setattr(files, "folders", lambda: iter([folder]))
     return folder
 
 
@@ -249,7 +255,7 @@ def temporary(tmp_path, monkeypatch):
     """A temporary folder, where nothing else can be written: neither the source nor the cache."""
     (tmp_path / "file").write_text("")
     (tmp_path / "tmp").mkdir(mode=0o777)
-    monkeypatch.setattr(files, "_BESIDE", tmp_path / "file" / "libraries")
+    monkeypatch.setattr(files, "BESIDE", tmp_path / "file" / "libraries")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
     return tmp_path / "tmp"
@@ -284,7 +290,7 @@ def test_where_nothing_at_all_can_be_written_numpy_computes_and_says_so(temporar
 
     monkeypatch.setattr(tempfile, "mkdtemp", none)
     monkeypatch.setattr(tempfile, "gettempdir", none)
-    monkeypatch.setattr(choice, "_in_use", None)
+    engine.use("numpy")
     used = engine.use("auto")
     assert (used.name, "No usable temporary directory" in used.told) == ("numpy", True)
 
@@ -304,12 +310,12 @@ def test_of_a_family_only_members_load_its_library(folder, monkeypatch):
     path = next(folder.iterdir())
     v3 = engine.TARGETS["x86-64-v3"]
     path.rename(folder / files.name_of(v3))
-    monkeypatch.setattr(targets.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
     monkeypatch.setattr(targets, "features_here", lambda: v3.needs | {"sse2"})
     assert files.target_of(engine.fitting()) == "any x86-64-v3"
     monkeypatch.setattr(targets, "features_here", lambda: v3.needs - {"avx2"})
     assert engine.fitting() is None
-    monkeypatch.setattr(targets.platform, "machine", lambda: "aarch64")
+    monkeypatch.setattr(platform, "machine", lambda: "aarch64")
     assert engine.fitting() is None
 
 
@@ -371,7 +377,7 @@ def test_objects_in_another_form_are_noticed(monkeypatch, what):
     if what == "Python":
         monkeypatch.setattr(library, "HEAD_BYTES", 32)
     else:
-        monkeypatch.setattr(library, "_content_of", lambda _: 0)
+        monkeypatch.setattr(library, "content_of", lambda _: 0)
     with pytest.raises(OSError, match=f"this {what} keeps"):
         library.load(engine.fitting())
 
@@ -391,7 +397,7 @@ def test_a_library_for_the_whole_family_computes_the_same(tmp_path, monkeypatch)
     engine.use("compiled")
     ours = everything()
     path = tmp_path / "modem.so"
-    engine.build([each for each in targets.FAMILIES if each.fits][-1], path)
+    engine.build([each for each in engine.TARGETS.values() if each.fits][-1], path)
     for name, kernel in library.load(path).items():
         monkeypatch.setattr(compute, name, kernel, raising=False)
     # Of noise, sums in another order are allowed.
@@ -431,7 +437,7 @@ def test_kernels_for_64_bit_arm_repeat_recorded_calls(tmp_path, monkeypatch):
     calls = golden_calls.recorded(monkeypatch, some_of_everything)
     (tmp_path / "calls").write_bytes(golden_calls.packed(calls))
     (tmp_path / "kernels.h").write_text("\n".join(f"KERNEL({name})" for name in ENTRIES))
-    builder._compile(engine.TARGETS["aarch64"], tmp_path / "kernels.o", None)
+    compile_kernels(engine.TARGETS["aarch64"], tmp_path / "kernels.o")
     program = tmp_path / "replay"
     subprocess.run(
         [
@@ -453,7 +459,7 @@ def test_kernels_for_64_bit_arm_repeat_recorded_calls(tmp_path, monkeypatch):
 
 def test_the_calls_compile_without_a_warning(tmp_path):
     (tmp_path / "kernels.h").write_text(library.header())
-    source = Path(library.__file__).with_name("call.c")
+    source = Path(engine.__file__).with_name("call.c")
     command = [sys.executable, "-m", "ziglang", "cc", "-Wall", "-Wextra", "-Werror", "-I", tmp_path]
     subprocess.run([*command, "-c", source, "-o", tmp_path / "call.o"], check=True)
 
@@ -462,7 +468,7 @@ def test_no_kernel_takes_or_leaves_more_words_than_a_call_has_room_for():
     def words(fields):
         return sum(1 + each.n_dimensions + (each.dtype.kind == "c") for each in fields)
 
-    source = Path(library.__file__).with_name("call.c").read_text()
+    source = Path(engine.__file__).with_name("call.c").read_text()
     room = {key: int(n) for key, n in re.findall(r"(MOST_\w+) = (\d+)", source)}
     assert max(words(entry.arguments) for entry in ENTRIES.values()) <= room["MOST_WORDS"]
     assert max(words(entry.results) for entry in ENTRIES.values()) <= room["MOST_RESULTS"]
