@@ -1,5 +1,6 @@
 """`sdrlinkctl lab`: one command runs a scenario; report and figures are in a folder."""
 
+import sys
 import time
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from backends import HubWatch
 from sdrlinkd.cli import run
 from sdrlinkd.cli.pace import scenario_names
 from sdrlinkd.drive import read_drive
+from sdrlinkd.extras import hint
 from sdrlinkd.lab import LabReport, find_scenario
 from sdrlinkd.lab import run as run_module
 from tests.conftest import ETC
@@ -122,6 +124,16 @@ def test_options_go_before_the_scenario(lab, asked, tmp_path):
     assert (scenario.duration_s, scenario.seed, scenario.pace) == (1.5, 9, "realtime")
     assert scenario.daemon == {"modem": {"mcs": 2}, "access": {"policy": "csma", "force": True}}
     assert (options.path, options.bag, options.traces) == (path, tmp_path / "bag", tmp_path)
+
+
+def test_without_jinja_there_is_no_page_and_the_last_line_says_how_to_get_it(
+    lab, asked, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    code, out, _ = lab(write_scenario(tmp_path))
+    *_, wrote, last = out.splitlines()
+    assert (code, wrote.endswith("out/report.json, drive.mcap"), last) == (0, True, hint("plots"))
+    assert not (tmp_path / "out/lab.png").exists()
 
 
 def test_without_options_the_scenario_is_as_written(lab, asked, tmp_path):

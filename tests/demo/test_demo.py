@@ -1,6 +1,7 @@
 """The demonstration, run for real."""
 
 import json
+import sys
 
 import pytest
 
@@ -8,6 +9,7 @@ from sdrlinkd.cli import run
 from sdrlinkd.demo import Options, open_source, run_demo
 from sdrlinkd.demo.links import write_config
 from sdrlinkd.drive import read_drive
+from sdrlinkd.extras import hint
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
 
 
@@ -127,6 +129,19 @@ def test_a_picture_that_cannot_be_written_is_told_in_words(tmp_path, capsys):
     (tmp_path / "path.png").mkdir()
     assert demo("--duration", 0.2, "--link", "direct", "--out", tmp_path) == 2
     assert "path.png" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_without_matplotlib_the_table_is_there_and_how_to_get_pictures(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    arguments = ("--duration", 0.5, "--link", "direct", "--out", tmp_path)
+    assert demo(*arguments) == 0
+    *shown, last = capsys.readouterr().out.splitlines()
+    assert any(line.startswith(" direct ") for line in shown)
+    assert last == hint("plots")
+    assert {path.name for path in tmp_path.rglob("*.*")} == {"report.json", "drive.mcap"}
 
 
 @pytest.mark.slow

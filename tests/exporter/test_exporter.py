@@ -17,6 +17,7 @@ from prometheus_client.openmetrics.parser import text_string_to_metric_families
 from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher
 from sdrlinkd.exporter import Collector, families, plain, samples
+from sdrlinkd.extras import hint
 from sdrlinkd.reports import TopicReport
 from tests.machine import lacks
 from tests.waiting import wait_for
@@ -153,7 +154,7 @@ def test_an_address_that_is_none_and_a_missing_library_are_one_sentence(monkeypa
     assert 'got "nonsense"; allowed: HOST:PORT' in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "prometheus_client", None)
     assert run(["exporter"]) == 2
-    assert "pip install 'sdrlinkd[metrics]'" in capsys.readouterr().err
+    assert hint("metrics") in capsys.readouterr().err
 
 
 @needs_prometheus

@@ -4,6 +4,7 @@ import contextlib
 import fcntl
 import os
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from tests.packages.debian import ROOT, Debian, call, lacking
 
 GIVEN = "SDRLINK_DEB"
+WHEEL = (sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -57,6 +59,18 @@ def once(
         user.unlink(missing_ok=True)
         if not list(parent.glob("systems-used-by-*")):
             shutil.rmtree(shared, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def wheels(once) -> tuple[Path, Path]:
+    """(the daemon's, the client's), as `make wheel` makes them but for the compiled modem."""
+
+    def build(folder: Path) -> None:
+        for project in (ROOT, ROOT / "etc/client"):
+            call(*WHEEL, folder, cwd=project)
+
+    folder = once("wheels", build)
+    return next(folder.glob("sdrlinkd-*.whl")), next(folder.glob("sdrlinkd_client-*.whl"))
 
 
 @pytest.fixture(scope="session")

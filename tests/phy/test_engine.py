@@ -171,7 +171,7 @@ def test_without_a_c_compiler_numpy_computes_and_says_why(without_library, monke
 def test_without_numba_numpy_computes_and_says_what_to_install(without_library, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     used = engine.use("auto")
-    assert (used.name, "`pip install numba`" in used.told) == ("numpy", True)
+    assert (used.name, "-m pip install numba`" in used.told) == ("numpy", True)
 
 
 def test_with_a_numba_that_fails_numpy_computes_and_says_why(
