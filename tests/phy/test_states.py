@@ -7,8 +7,8 @@ import pytest
 
 from phy import Receiver
 from phy.states import NEXT, Found, IllegalStepError, State, after
+from tests.phy.chunks import make_stream
 from tests.phy.signals import noise
-from tests.phy.test_chunking import make_stream
 
 PIECE = 700
 
