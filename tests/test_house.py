@@ -5,7 +5,10 @@ import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
+
+import pytest
 
 import backends
 import phy
@@ -112,45 +115,59 @@ def test_rooms_of_the_link_import_down_and_reach_into_nobody():
     assert 1000 * chains / lines < 3
 
 
-def test_tests_of_the_link_enter_by_a_door():
+DOORS_OF_PHY = {"engine", "kernels", "reference", "testing", "wifi"}
+
+
+@cache
+def used_by_tests():
+    """What each file of the tests imports, and what it replaces: (path, full name)."""
+    return [(path, name) for path in sources("tests") for name in imported(path)]
+
+
+def imported(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (each.name for each in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{each.name}" for each in node.names)
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "setattr":
+            yield ast.unparse(node.args[0]).removeprefix("f").strip("'")
+
+
+def doors():
+    """Packages that the product enters by their doors, and the names that each door has."""
+    rules = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    protected = {each for rule in rules["contracts"] for each in rule.get("protected_modules", ())}
+    packages = {each.removesuffix(".**") for each in protected if each.endswith(".**")}
+    for package in (*packages, *(f"phy.{each}" for each in DOORS_OF_PHY)):
+        path = ROOT / package.replace(".", "/")
+        text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+        listed = re.search(r"^__all__ = (\[.*?\])", text, re.MULTILINE | re.DOTALL)
+        more = DOORS_OF_PHY if package == "phy" else {"testing"}
+        yield package, {*ast.literal_eval(listed[1]), *more}
+
+
+def past(name, names):
+    """The package that `name` enters, but by its door (`names`); None: no package."""
+    parts = name.split(".")
+    for n in range(len(parts), 0, -1):
+        if (package := ".".join(parts[:n])) in names:
+            return package if parts[n:] and parts[n] not in names[package] else None
+    return None
+
+
+@pytest.mark.slow
+def test_tests_enter_by_doors():
     """So the inside of a package can change without them."""
-    inside = re.compile(r"^\s*(?:from|import) sdrlinkd\.link\.\w+\.\w+", re.MULTILINE)
-    past = [path for path in sources("tests", "benchmarks") if inside.search(path.read_text())]
-    assert past == []
+    names = dict(doors())
+    assert past("sdrlinkd.link.access.csma.after", names) == "sdrlinkd.link.access"
+    assert past("sdrlinkd.link.access.after", names) is None
+    assert past("phy.kernels.viterbi.decode_rows", names) == "phy.kernels"
+    assert [use for use in used_by_tests() if past(use[1], names)] == []
 
 
-PHY_DOORS = ("phy", "phy.engine", "phy.kernels", "phy.reference", "phy.testing", "phy.wifi")
-
-
-def offered_by(door):
-    """The names in a module's `__all__`; kernels are not imported, as that takes a second."""
-    path = ROOT / door.replace(".", "/")
-    text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
-    offered = re.search(r"^__all__ = (\[.*?\])", text, re.MULTILINE | re.DOTALL)[1]
-    return ast.literal_eval(offered)
-
-
-def names_in(text, package):
-    """What a source names of a package: imported, used, or in a string, such as a program."""
-    dotted = rf"(?<![\w./]){package}(?:\.(?!__)[a-z_]\w*)*(?:\.[A-Z]\w*)?"
-    imports = rf"from ({dotted}) import (?:\(([^)]*)\)|([\w, ]+))"
-    for module, several, one in re.findall(imports, text):
-        yield from (f"{module}.{name}" for name in re.findall(r"(\w+)(?: as \w+)?", several or one))
-    # Another package may have a module of that name.
-    is_imported = re.search(rf"import {package}\b", text)
-    yield from re.findall(
-        dotted if is_imported else rf"(?<=[\"']){dotted}", re.sub(imports, "", text)
-    )
-
-
-def test_tests_of_phy_enter_by_a_door():
-    """So its inside can change without them; `phy.testing` offers them what nobody else needs."""
-    offered = {f"{door}.{name}" for door in PHY_DOORS for name in offered_by(door)}
-    named = {
-        (str(path.relative_to(ROOT)), name)
-        for path in sources("tests")
-        for name in names_in(path.read_text(), "phy")
-    }
-    past = {(path, name) for path, name in named if name not in {*PHY_DOORS, *offered}}
-    assert past == set()
-    assert len(named) > 300
+@pytest.mark.slow
+def test_tests_import_from_no_other_test():
+    """What several of them need is in a module of its own."""
+    ours = [use for use in used_by_tests() if use[1].startswith("tests.")]
+    assert [use for use in ours if ".test_" in use[1]] == []

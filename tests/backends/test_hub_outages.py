@@ -18,9 +18,7 @@ from backends import (
     TxOutcome,
     hub_in,
 )
-from backends.ether import protocol
-from backends.feed import MAX_WAITING
-from backends.hub_address import AIR
+from backends.testing import AIR, CONSTANTS, MAX_WAITING, protocol
 from tests.backends.hubs import Listener, ask, serving, until
 from tests.backends.radios import BLOCK_S, RATE, TUNING, N, noise, opened, send, take
 
@@ -106,7 +104,7 @@ async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave
         await until(lambda: radio.counters["hub_outages"] == 1)
         lost.append(radio.send(TxBurst(0, noise(10))))
         # The second hub stays, however slow the machine is.
-        monkeypatch.setattr("backends.ether.presence.QUIET_S", 10.0)
+        monkeypatch.setattr(*CONSTANTS["presence_quiet_s"], 10.0)
         with serving(tmp_path, {1: params}):
             assert {(await each).outcome for each in lost} == {TxOutcome.LOST}
             assert ask(tmp_path).bursts == 0, "what was sent in vain stays where it is"
@@ -163,7 +161,7 @@ async def test_a_hub_that_was_silent_but_knows_its_radios_is_not_joined_again(tm
 
 @pytest.mark.slow
 async def test_a_radio_that_does_not_read_misses_samples_and_hinders_nobody(tmp_path, monkeypatch):
-    monkeypatch.setattr("backends.ether.real_time.MAX_BEHIND_S", 0.05)
+    monkeypatch.setattr(*CONSTANTS["real_time_max_behind_s"], 0.05)
     with serving(tmp_path):
         listener = Listener(tmp_path)
         async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:

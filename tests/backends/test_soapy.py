@@ -20,13 +20,10 @@ from backends import (
     TxOutcome,
     probe_devices,
 )
-from backends.soapy.binding import driver_of
-from backends.soapy.binding.api import DriverError, StreamResult, check_buffer, check_result
-from backends.soapy.driver_log import DriverLog
-from backends.soapy.protocol.ring import SampleRing, make_shared
-from backends.soapy.radio_process.clock import SampleClock
-from backends.soapy.radio_process.tx_stream import TxStream
-from backends.soapy.settings.tx_timing import timing_of
+from backends.soapy.binding import DriverError, StreamResult, driver_of
+from backends.soapy.protocol import SampleRing, make_shared
+from backends.soapy.settings import timing_of
+from backends.testing import DriverLog, SampleClock, TxStream, check_buffer, check_result
 from tests.backends.radios import RATE, TUNING, N, noise, opened, take, turn
 from tests.soapy_loopback import Bus, missing
 

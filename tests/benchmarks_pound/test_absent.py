@@ -14,7 +14,7 @@ from benchmarks.peers.pound.namespaces import Network, Node
 from benchmarks.pound import __main__ as pound
 from benchmarks.pound import beside, limits, realtime
 from benchmarks.report import Row
-from tests.benchmarks_pound.test_peers import in_namespaces
+from tests.benchmarks_pound.machine import in_namespaces
 
 BROKEN = "libzenohc.so: cannot open shared object file"
 

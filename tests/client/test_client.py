@@ -17,7 +17,7 @@ from sdrlinkd.client import (
     Publisher,
     Subscriber,
 )
-from sdrlinkd.client.messages import topic_filter
+from sdrlinkd.client.testing import topic_filter
 
 CDR = b"\0\1\0\0"
 

@@ -14,9 +14,8 @@ from sdrlinkd.client import (
     Publisher,
     Subscriber,
     pack_map,
-    producer,
 )
-from sdrlinkd.client.messages import new_ack_topic
+from sdrlinkd.client.testing import CONSTANTS, new_ack_topic
 from tests.conftest import ETC
 from tests.waiting import wait_for
 
@@ -160,7 +159,7 @@ def registry_of(folder, *names):
 def looking(request, monkeypatch):
     """A producer that queries the daemon again after a restart, before it refuses."""
     if request.param == "only asks":
-        monkeypatch.setattr(producer, "LOOK_S", 1e9)
+        monkeypatch.setattr(*CONSTANTS["look_s"], 1e9)
 
 
 def test_a_daemon_with_another_registry_is_believed(start_daemon, restart, tmp_path, looking):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from backends.soapy.radio_process.session import AWAY_S
+from backends.testing import AWAY_S
 from sdrlinkd.client import Publisher, Subscriber
 from tests.daemon.soapy import air, on_soapy
 from tests.laws import one_in

@@ -6,8 +6,8 @@ import sys
 import pytest
 
 from sdrlinkd.cli import run
-from sdrlinkd.demo import Options, open_source, run_demo
-from sdrlinkd.demo.links import write_config
+from sdrlinkd.demo import Options, open_source, run_demo, write_config
+from sdrlinkd.demo.testing import WRITE_CONFIG
 from sdrlinkd.drive import read_drive
 from sdrlinkd.extras import hint
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
@@ -118,7 +118,7 @@ def test_a_clean_link_that_loses_messages_is_a_fault(tmp_path, monkeypatch, caps
         path.write_text(path.read_text() + "[direct]\nloss = 0.5\n")
         return path
 
-    monkeypatch.setattr("sdrlinkd.demo.run.write_config", lossy)
+    monkeypatch.setattr(*WRITE_CONFIG, lossy)
     arguments = ("--link", "direct", "--duration", 0.5, "--out", tmp_path)
     assert demo(*arguments) == 1
     (told,) = [line for line in capsys.readouterr().out.splitlines() if "did not arrive" in line]

@@ -12,8 +12,7 @@ from sdrlinkd.__main__ import _parser
 from sdrlinkd.cli.app import run
 from sdrlinkd.config import Config
 from sdrlinkd.link import RX_PDU_REASONS, RX_REASONS, TX_REASONS
-from sdrlinkd.manual import find_key, key_names, sections
-from sdrlinkd.manual.attributes import field_texts
+from sdrlinkd.manual import field_texts, find_key, key_names, sections
 from sdrlinkd.reports import Snapshot
 from tests.docs.pages import ROOT
 from tests.machine import lacks

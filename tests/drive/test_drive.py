@@ -25,7 +25,7 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.reports import ReceivedTopicReport, VerdictReport
 from tests.laws import law
 from tests.reported import neighbor, snapshot, topic
-from tests.web.test_map import ODOMETRY, odometry
+from tests.web.odometry import ODOMETRY, odometry
 
 SECOND_NS = 1_000_000_000
 BEGIN_NS = 1_800_000_000 * SECOND_NS

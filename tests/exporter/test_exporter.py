@@ -19,10 +19,10 @@ from sdrlinkd.client import Publisher
 from sdrlinkd.exporter import Collector, families, plain, samples
 from sdrlinkd.extras import hint
 from sdrlinkd.reports import TopicReport
+from tests.exporter.conftest import RULES
 from tests.machine import lacks
 from tests.waiting import wait_for
 
-RULES = Path(__file__).parents[2] / "etc/prometheus/sdrlink.rules.yml"
 STATE = "sdrlink_verdict_level"
 CLOCK = "sdrlink_neighbor_clock_state"
 needs_prometheus = pytest.mark.skipif(shutil.which("promtool") is None, reason=lacks("prometheus"))

@@ -9,8 +9,7 @@ import pytest
 from benchmarks.fleet.field import GUARD
 from benchmarks.fleet.pdu_air import PduAir
 from sdrlinkd.client import NoDaemonError, Publisher, RefusedError, Subscriber
-from sdrlinkd.fleet import GatewayReport, encode
-from sdrlinkd.fleet.formats import Passed
+from sdrlinkd.fleet import GatewayReport, Passed, encode
 from sdrlinkd.process import Process, module
 from tests.fleet.conftest import Router
 from tests.waiting import wait_for

@@ -1,7 +1,6 @@
 """`grant`: nobody clashes, everybody has a turn in time, and the team finds another root."""
 
 from collections import defaultdict
-from functools import cache
 from itertools import combinations, pairwise, product
 from random import Random
 
@@ -32,9 +31,9 @@ from sdrlinkd.link.access import (
 from sdrlinkd.wire import ANYBODY, Frame, Grant, Want, build_records
 from tests.laws import law, one_in
 from tests.link.radios import params
+from tests.link.schedules import FORMED_S, schedule_of
 from tests.link.turns import LONGEST_S, PDU_S, ROOM, STEP_S, TRAITS, Team, tell, told_events
 
-FORMED_S = 3.0
 TIMES = Times(Ticks(1e-4, 2e-4), PDU_S, 0.02, LONGEST_S, 3e-4, 5e-4)
 CHAIN = {(1, 2), (2, 3)}
 TUNNEL = {(1, 2), (2, 3), (3, 4), (4, 5)}
@@ -46,14 +45,6 @@ def saturated(n, seed, **more):
     for robot in team.robots.values():
         robot.bulk_s = 1e3
     return team
-
-
-@cache
-def schedule_of(nodes):
-    """What identifies the schedule of these robots, as their plans tell it."""
-    team = Team(list(nodes), 1)
-    team.run(FORMED_S)
-    return team.schedule
 
 
 def with_urgent(team, node, begin_s, end_s, per_s=10.0):

@@ -7,7 +7,7 @@ import pytest
 from sdrlinkd.link import RateParams
 from sdrlinkd.wire import ANYBODY, BROADCAST, Frame, Grant, PduBuilder, build_records, flags
 from tests.link.radios import params
-from tests.link.test_access_grant import schedule_of
+from tests.link.schedules import schedule_of
 from tests.link.turns import PDU_S, ROOM, TRAITS, Team
 from tests.link.world import make_link
 

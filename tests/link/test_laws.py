@@ -21,13 +21,8 @@ from sdrlinkd.link import (
 )
 from sdrlinkd.pdulink import Impairment
 from tests.laws import law
+from tests.link.books import assert_books_balance
 from tests.link.world import compose, make_link, rx, send_all, tx
-
-
-def assert_books_balance(link, seed):
-    ledger = tx(link)
-    assert link.audit() == [], f"seed {seed}"
-    assert ledger.queued == sum(ledger.queued_by_class.values())
 
 
 def any_policy(rng):

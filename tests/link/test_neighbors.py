@@ -5,7 +5,7 @@ import pytest
 from sdrlinkd.link import Overrides
 from sdrlinkd.link.receive import LONGEST_GAP_S, Neighbor
 from sdrlinkd.wire import LinkReport
-from tests.link.test_routes import mesh
+from tests.link.meshes import mesh
 from tests.link.world import compose, make_link, records_in
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from sdrlinkd.link import ClockParams, PduLinkTraits
-from tests.link.test_routes import isolate, mesh
+from tests.link.meshes import isolate, mesh
 
 
 def share(air, robot, of):

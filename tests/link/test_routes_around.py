@@ -7,7 +7,7 @@ import pytest
 from sdrlinkd.link import Overrides
 from sdrlinkd.link.routes import Routes
 from sdrlinkd.wire import BROADCAST, DST, HOP, SEQ, SRC, Lsa
-from tests.link.test_routes import AUTO, flows, mesh
+from tests.link.meshes import AUTO, flows, mesh
 
 PERIOD_S = 0.02
 

@@ -29,9 +29,9 @@ from phy import (
     reference,
 )
 from tests.laws import law, often
+from tests.phy.chunks import chunk_sizes, make_stream, push_all
 from tests.phy.foreign import FOREIGN
 from tests.phy.signals import endings, heard, noise, noisy, payloads, silence, turned
-from tests.phy.test_chunking import chunk_sizes, make_stream, push_all
 
 pytestmark = pytest.mark.slow  # together; each is quick
 

@@ -7,8 +7,8 @@ import pytest
 
 from phy import Receiver
 from phy.testing import states
+from tests.phy.chunks import make_stream
 from tests.phy.signals import noise
-from tests.phy.test_chunking import make_stream
 
 PIECE = 700
 State, Found, NEXT = states.State, states.Found, states.NEXT

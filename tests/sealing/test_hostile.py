@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from sdrlinkd.link import AccessParams, Outcome
 from sdrlinkd.sealing import Key, SecurityParams
-from sdrlinkd.sealing.ciphers import Ciphers
+from sdrlinkd.sealing.testing import Ciphers
 from sdrlinkd.wire import KeyTold, delayed, parse, parse_sealed, read_control_entries
 from tests.laws import law
 from tests.sealing.team import KEY, Robot, Team

@@ -6,7 +6,7 @@ from random import Random
 import pytest
 
 from sdrlinkd.wire import is_sealed, parse_sealed
-from tests.sealing.test_attacks import Commands, chain, judge, pair
+from tests.sealing.attacks import Commands, chain, judge, pair
 
 
 @pytest.mark.slow

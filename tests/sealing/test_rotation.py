@@ -2,8 +2,8 @@
 
 import pytest
 
-from sdrlinkd.sealing import Remembered, rotation
-from sdrlinkd.sealing.rotation import QUIET_S
+from sdrlinkd.sealing import Remembered
+from sdrlinkd.sealing.testing import CONSTANTS, QUIET_S
 from sdrlinkd.wire import N_TICKS, parse_sealed
 from tests.sealing.team import KEY, NEXT, Robot, Team
 
@@ -54,7 +54,7 @@ def test_none_lost_while_keys_change(apart_s):
 @pytest.mark.slow
 def test_a_lost_robot_delays_the_others_for_a_limited_time_and_is_out_then(monkeypatch):
     longest_s = 60.0
-    monkeypatch.setattr(rotation, "LONGEST_S", longest_s)
+    monkeypatch.setattr(*CONSTANTS["longest_s"], longest_s)
     team = Team(*(Robot(each, [KEY]) for each in (1, 2, 3)))
     team.run(2.0)
     for each in (1, 2):
