@@ -69,20 +69,21 @@ async def test_few_blocks_wait_for_a_receiver_that_is_slow():
         wakes=True,
         call=lambda deliver, *to: deliver(*to),
     )
-    put = 0
+    put, is_full = 0, asyncio.Event()
 
     async def put_all():
         nonlocal put
         for block in more:
             await receiver.put(block)
             put += 1
+            if put == MAX_BLOCKS:
+                is_full.set()
             await asyncio.sleep(0)
 
     putting = asyncio.ensure_future(put_all())
     try:
         async with asyncio.timeout(60):
-            while put < MAX_BLOCKS:
-                await asyncio.sleep(0)
+            await is_full.wait()
         for _ in range(100):
             await asyncio.sleep(0)
         assert put <= MAX_BLOCKS + 1, "one is at the receiver"
