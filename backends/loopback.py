@@ -88,7 +88,7 @@ class LoopbackRadio:
         """Start at index 0, at the rate of `tuning`."""
         self._n = max(1, round(self._block_s * tuning.rate_hz))
         self._long = max(self._n, round(LONG_S * tuning.rate_hz))
-        self._max_behind = round(MAX_BEHIND_S * tuning.rate_hz)
+        self._rate_hz = tuning.rate_hz
         self._pace = Pace(tuning.rate_hz, self._paced)
         self._is_open = True
 
@@ -137,7 +137,7 @@ class LoopbackRadio:
         behind = max(0, self._pace.wait_for(first + n))
         samples: Samples | None = None
         reason = ""
-        if behind > self._max_behind:
+        if behind > MAX_BEHIND_S * self._rate_hz:
             n += behind
             reason = "the reader was too slow"
             self.counters["overflows"] += 1

@@ -7,8 +7,11 @@ from backends.air import Timeline
 from backends.dc import DcBlocker
 from backends.ether import Medium, Piece, hub, presence, protocol, radio, real_time
 from backends.ether.medium import LEAD, MARGIN, NOISE_DBFS
+from backends.ether.presence import Presence
+from backends.ether.real_time import BEHIND_S
 from backends.ether.remote_clock import WINDOW_S, HubClock
-from backends.feed import MAX_WAITING
+from backends.ether.sockets import HubSockets
+from backends.feed import MAX_WAITING, BlockFeed
 from backends.hub_address import AIR, SKY
 from backends.loopback import MAX_LATE_BLOCKS
 from backends.outstanding import Outstanding
@@ -26,6 +29,7 @@ from backends.soapy.radio_process.tx_stream import TxStream
 __all__ = [
     "AIR",
     "AWAY_S",
+    "BEHIND_S",
     "CONSTANTS",
     "LEAD",
     "MARGIN",
@@ -37,13 +41,16 @@ __all__ = [
     "SKY",
     "TRIM",
     "WINDOW_S",
+    "BlockFeed",
     "DcBlocker",
     "DriverLog",
     "HubClock",
+    "HubSockets",
     "Medium",
     "Outstanding",
     "Pace",
     "Piece",
+    "Presence",
     "SampleClock",
     "Timeline",
     "TimestampedTransmitter",

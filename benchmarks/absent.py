@@ -46,6 +46,11 @@ def tell(what: str, reason: object) -> None:
         sys.stderr.write(f"not measured: {what}: {line}\n")
 
 
+def forget() -> None:
+    """Forget what was reported, so that it is reported again."""
+    _told.clear()
+
+
 def told() -> dict[str, str]:
     """Everything reported so far: what was not measured, and why."""
     return dict(_told)

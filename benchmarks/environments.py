@@ -57,11 +57,11 @@ def unavailable(peers: Mapping[str, NeedsEnvironment], peer: str) -> str | None:
     """Why a peer cannot run here, or None if it can; creates the environment that it needs."""
     if peer not in peers:
         return f"no peer is called {peer!r}; there are {', '.join(peers)}"
-    return _lacking(peers[peer].environment)
+    return _lacking(peers[peer].environment, _folder())
 
 
 @cache
-def _lacking(environment: str) -> str | None:
+def _lacking(environment: str, _of: Path) -> str | None:
     try:
         interpreter(environment)
     except EnvironmentLackingError as error:
@@ -69,11 +69,16 @@ def _lacking(environment: str) -> str | None:
     return None
 
 
+def _folder() -> Path:
+    """Where the environments are."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "sdrlinkd-bench"
+
+
 def interpreter(environment: str) -> str:
     """The Python interpreter for endpoints; "" is ours. Creates a missing environment (slow)."""
     if not environment:
         return sys.executable
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "sdrlinkd-bench"
+    cache = _folder()
     folder = cache / environment
     python, made = folder / "bin" / "python", folder / ".made"
     try:

@@ -28,7 +28,7 @@ _LIQUID_NOISE_THERE = 67.0
 
 
 @dataclass(frozen=True)
-class _Peers:
+class Peers:
     """Msps of other modems, measured once; (tx, rx) by bits per subcarrier and bytes."""
 
     liquid: dict[tuple[int, int], tuple[float, float]]
@@ -50,7 +50,7 @@ class _Peers:
 def measure(seed: int, quick: bool) -> Iterator[Row]:
     """Measure the rows of receiver, transmitter and latency."""
     rounds = 3 if quick else 20
-    peers = _measure_peers(seed)
+    peers = measure_peers(seed)
     yield _search("search_msps_noise", 200.0, _noise(seed), rounds, peers)
     yield _search("search_msps_gfsk_+20db", 40.0, _neighbors(seed), rounds, peers)
     yield _receive("rx_msps_16x220B_qpsk12", QPSK12, 16, 220, 80.0, seed, rounds, peers)
@@ -60,9 +60,10 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
     yield _latency(seed, 20 * rounds, peers)
 
 
-def _measure_peers(seed: int) -> _Peers:
+def measure_peers(seed: int) -> Peers:
+    """Measure the other modems; those that cannot be are reported and left out."""
     liquid, gnuradio = Liquid(), GnuRadio()
-    peers = _Peers({}, {}, {})
+    peers = Peers({}, {}, {})
     with attempt(liquid.name):
         for bits, n_bytes in _LIQUID_THERE:
             peers.liquid[bits, n_bytes] = liquid.speed("none", bits, n_bytes)
@@ -114,7 +115,7 @@ def gfsk(rng: np.random.Generator, n: int, samples_a_bit: int) -> NDArray[np.com
 
 
 def _search(
-    name: str, target: float, signals: list[NDArray[np.complex64]], rounds: int, peers: _Peers
+    name: str, target: float, signals: list[NDArray[np.complex64]], rounds: int, peers: Peers
 ) -> Row:
     """Search speed on the slowest of `signals`, which contain no burst."""
     msps, notes = [], []
@@ -145,7 +146,7 @@ def _stream(mcs: int, n_pdus: int, n_bytes: int, n_bursts: int, seed: int) -> ND
 
 def _receive(
     name: str, mcs: int, n_pdus: int, n_bytes: int, target: float, seed: int, rounds: int,
-    peers: _Peers,
+    peers: Peers,
 ) -> Row:  # fmt: skip
     n_bursts = 400 // n_pdus
     x = _stream(mcs, n_pdus, n_bytes, n_bursts, seed)
@@ -163,7 +164,7 @@ def _receive(
     return row
 
 
-def _transmit(seed: int, rounds: int, peers: _Peers) -> Row:
+def _transmit(seed: int, rounds: int, peers: Peers) -> Row:
     rng, transmitter = np.random.default_rng(seed), Transmitter()
     pdus = [rng.bytes(220) for _ in range(100)]
     n = len(transmitter.modulate(pdus[:1], QPSK12))
@@ -175,7 +176,7 @@ def _transmit(seed: int, rounds: int, peers: _Peers) -> Row:
     return row
 
 
-def _latency(seed: int, n: int, peers: _Peers) -> Row:
+def _latency(seed: int, n: int, peers: Peers) -> Row:
     """Median time from the samples of a whole burst, in one call, to its PDU's bytes."""
     x = _stream(QPSK12, 1, 220, n, seed).reshape(n, -1)
     receiver, took_s = Receiver(), []

@@ -22,7 +22,7 @@ DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
 def main(arguments: list[str] | None = None) -> int:
     """Run the daemon; returns 0 after a clean stop, 2 for errors that a person can fix."""
     end_with_parent()
-    options = _parser().parse_args(arguments)
+    options = make_parser().parse_args(arguments)
     # Until the daemon can read its configuration again, a request to do so must not end it.
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     log_to_stderr(logging.getLevelNamesMapping()[options.log_level.upper()])
@@ -81,7 +81,8 @@ def _checked(setup: "Setup") -> list[str]:
     return [*setup.summary(), *told, verdict]
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """The daemon's options."""
     parser = argparse.ArgumentParser(
         prog="sdrlinkd", description="ROS 2 messages between robots over software radio."
     )

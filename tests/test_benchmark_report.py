@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import absent, environments, phy_speed, report
+from benchmarks import absent, phy_speed, report
 from benchmarks.absent import PeerError, attempt
 from benchmarks.latency import rows
 from benchmarks.peers.modems import gnu_radio
@@ -21,8 +21,8 @@ ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(autouse=True)
-def nothing_told(monkeypatch):
-    monkeypatch.setattr(absent, "_told", {})
+def nothing_told():
+    absent.forget()
 
 
 @pytest.mark.parametrize(("value", "target", "better", "ok"), [
@@ -125,7 +125,7 @@ def test_modems_that_cannot_be_measured_are_left_out(monkeypatch, capsys, tmp_pa
         (tmp_path / "gcc").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(gnu_radio, "PYTHON", "/nonexistent/python3")
-    peers = phy_speed._measure_peers(1)
+    peers = phy_speed.measure_peers(1)
     assert (peers.liquid, peers.gnuradio, peers.noise) == ({}, {}, {})
     liquid, gnuradio = capsys.readouterr().err.splitlines()
     assert liquid.startswith("not measured: liquid-dsp: ")
@@ -165,8 +165,6 @@ def test_a_peer_that_fails_in_its_second_pass_keeps_its_first(monkeypatch, capsy
 def test_a_peer_whose_environment_cannot_be_made_is_left_out(monkeypatch, capsys, tmp_path):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    # Other tests keep what is known of this machine's own environments.
-    monkeypatch.setattr(environments, "_lacking", environments._lacking.__wrapped__)
     assert rows.sessions(1, 1.0, 1, of=("mavlink", "mavros")) == {}
     mavlink, mavros = capsys.readouterr().err.splitlines()
     assert mavlink.startswith("not measured: mavlink: ")
@@ -180,7 +178,7 @@ def test_peers_of_pound_go_on_without_one(capsys):
             raise OSError("no such tool")
         return 1.0
 
-    assert beside._each(["tcp", "udp", "zenoh"], "outage", one) == {"tcp": 1.0, "zenoh": 1.0}
+    assert beside.each(["tcp", "udp", "zenoh"], "outage", one) == {"tcp": 1.0, "zenoh": 1.0}
     assert "not measured: udp, outage: no such tool\n" in capsys.readouterr().err
 
 

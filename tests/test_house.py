@@ -115,6 +115,23 @@ def test_rooms_of_the_link_import_down_and_reach_into_nobody():
     assert 1000 * chains / lines < 3
 
 
+def test_no_test_names_what_is_private():
+    """In an import, or as text for `setattr` and its like; ruff (SLF001) finds the attributes."""
+    may = re.compile(r"""(?:import|^ ) .*\b_[a-z]\w*,?$|["'.]_[a-z]\w*["']""", re.MULTILINE)
+    private, found = re.compile(r"(?:^|\.)_[a-z]\w*$"), []
+    for path in sources("tests"):
+        # To read the text is quicker than to parse it.
+        tree = ast.parse(text) if may.search(text := path.read_text()) else ast.Module([], [])
+        for node in ast.walk(tree):
+            names = []
+            if isinstance(node, ast.ImportFrom):
+                names = [each.name for each in node.names]
+            elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("attr"):
+                names = [each.value for each in node.args if isinstance(each, ast.Constant)]
+            found += [(str(path), node.lineno, name) for name in names if private.search(f"{name}")]
+    assert found == []
+
+
 DOORS_OF_PHY = {"engine", "kernels", "reference", "testing", "wifi"}
 
 

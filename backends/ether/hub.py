@@ -63,7 +63,8 @@ class EtherHub:
         self._paced = paced
         self._until_s = until_s
         self._seed = seed
-        self._medium = Medium(air, world, seed)
+        self.medium = Medium(air, world, seed)
+        """The air itself."""
         self._members: dict[int, _Member] = {}
         self._by_token: dict[int, _Member] = {}
         self._tokens = Random()
@@ -143,8 +144,8 @@ class EtherHub:
         member = _Member(hello.node, identity, hello.who, token, self._step or -1)
         self._members[hello.node] = self._by_token[token] = member
         radio = self._radios.get(hello.node, RadioParams())
-        self._medium.leave(hello.node)
-        self._medium.join(hello.node, radio, self._now)
+        self.medium.leave(hello.node)
+        self.medium.join(hello.node, radio, self._now)
         return protocol.Welcome(
             token=token,
             radio=radio,
@@ -208,9 +209,9 @@ class EtherHub:
 
     def _forward(self, member: _Member, sent: protocol.Sent, burst: TxBurst) -> None:
         """In real time: send a burst to those who hear it, and tell the sender where it is."""
-        self._medium.pass_time(member.node, self._now + TRAVEL_S)
+        self.medium.pass_time(member.node, self._now + TRAVEL_S)
         may_leave = self._may_leave(member, burst, sent.late_seen)
-        start, arrivals = self._medium.place(member.node, burst) if may_leave else (None, [])
+        start, arrivals = self.medium.place(member.node, burst) if may_leave else (None, [])
         for node, at, way in arrivals:
             there = self._members.get(node)
             # What is too far away to be numbered, or has no power that can be told, never arrives.
@@ -228,7 +229,7 @@ class EtherHub:
         if member is not None:
             start = None
             if self._may_leave(member, burst, late_seen):
-                start = self._medium.send(node, burst)
+                start = self.medium.send(node, burst)
             member.late += start is None
             member.placed.append(protocol.Placed(number, start, len(burst.samples)))
 
@@ -238,7 +239,7 @@ class EtherHub:
 
     def _hand_out(self) -> None:
         """In lock-step: hand out the step to all radios."""
-        pieces = {node: self._medium.take(node, self._now) for node in self._members}
+        pieces = {node: self.medium.take(node, self._now) for node in self._members}
         for member in list(self._members.values()):
             each = pieces[member.node] or [Piece(0, None, is_deaf=False)]
             for i, piece in enumerate(each):
@@ -278,7 +279,7 @@ class EtherHub:
     def _remove(self, member: _Member) -> None:
         if self._members.get(member.node) is member:
             del self._members[member.node]
-            self._medium.leave(member.node)
+            self.medium.leave(member.node)
         self._by_token.pop(member.token, None)
         # An air in lock-step does not wait for a radio that has left.
         self._expected.discard(member.node)
@@ -288,8 +289,8 @@ class EtherHub:
             now_s=self._now,
             nodes={node: member.who for node, member in sorted(self._members.items())},
             is_over=self._is_over,
-            bursts=self._medium.bursts,
-            bursts_late=self._medium.bursts_late,
+            bursts=self.medium.bursts,
+            bursts_late=self.medium.bursts_late,
             bursts_lost=self._bursts_lost,
             paced=self._paced,
             host_ns=time.monotonic_ns(),

@@ -2,11 +2,9 @@
 
 import os
 import threading
-from collections import deque
 
 DEBUG = "SDRLINKD_DEBUG"
 """Environment variable that shows all output of drivers."""
-KEPT = 20
 _PIECE = 4096
 _JOIN_S = 0.5
 
@@ -15,7 +13,7 @@ class DriverLog:
     """A pipe for a process's output, read by its own thread until the process has ended."""
 
     def __init__(self) -> None:
-        self._lines: deque[str] = deque(maxlen=KEPT)
+        self._last = ""
         self._shown = bool(os.environ.get(DEBUG))
         self._read_fd, self._write_fd = os.pipe()
         self._thread = threading.Thread(target=self._read, daemon=True)
@@ -33,14 +31,17 @@ class DriverLog:
     def last_line(self) -> str:
         """The last line that the ended process printed, or empty."""
         self._thread.join(_JOIN_S)
-        return next((line for line in reversed(self._lines) if line), "")
+        return self._last
 
     def _read(self) -> None:
         rest = ""
         while piece := os.read(self._read_fd, _PIECE):
             *lines, rest = (rest + piece.decode(errors="replace")).split("\n")
-            self._lines.extend(line.strip() for line in lines)
+            self._note(lines)
             # Some drivers print single letters and never a newline.
             rest = rest[-_PIECE:]
-        self._lines.append(rest.strip())
+        self._note([rest])
         os.close(self._read_fd)
+
+    def _note(self, lines: list[str]) -> None:
+        self._last = next((line.strip() for line in reversed(lines) if line.strip()), self._last)

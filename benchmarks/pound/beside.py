@@ -50,7 +50,7 @@ def tables(
         with network(shared=relay, relay=relay) as on:
             return by_flow(run_peer(name, list(flows), on, seed))
 
-    return _each(peers, f"{'two hops' if relay else 'one hop'}", one)
+    return each(peers, f"{'two hops' if relay else 'one hop'}", one)
 
 
 def one_channel(
@@ -66,7 +66,7 @@ def one_channel(
         with network(shared=True, discipline=discipline) as on:
             return by_flow(run_peer(peer, list(flows), on, seed))
 
-    return _each([*ways], "one channel", one)
+    return each([*ways], "one channel", one)
 
 
 def bandwidths(
@@ -82,7 +82,7 @@ def bandwidths(
                 found[size] = saturate(name, size, seconds, on)
         return found
 
-    return _each(peers, "bandwidth", one)
+    return each(peers, "bandwidth", one)
 
 
 def recoveries(
@@ -94,7 +94,7 @@ def recoveries(
         with network(shared=shared, relay=relay) as on:
             return Recovery(*map(float, np.max(outage(name, on), axis=0)))
 
-    return _each(peers, f"outage{', one channel' * shared}{', two hops' * relay}", one)
+    return each(peers, f"outage{', one channel' * shared}{', two hops' * relay}", one)
 
 
 def loops(peers: Sequence[str], phases: Sequence[float]) -> dict[str, float]:
@@ -103,10 +103,11 @@ def loops(peers: Sequence[str], phases: Sequence[float]) -> dict[str, float]:
     def one(name: str) -> float:
         return float(np.mean([rms_mv(control_loop(name, phase, LOOP_S)) for phase in phases]))
 
-    return _each(peers, "control loop", one)
+    return each(peers, "control loop", one)
 
 
-def _each(peers: Sequence[str], what: str, one: Callable[[str], T]) -> dict[str, T]:
+def each(peers: Sequence[str], what: str, one: Callable[[str], T]) -> dict[str, T]:
+    """What `one` measures of each peer; reports as `what` those of which it cannot."""
     found = {}
     with _progress(what, len(peers)) as advance:
         for name in peers:

@@ -42,11 +42,11 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
     with attempt("two daemons and an outage"), running("ether", (1, 2), outages) as ends:
         recovered = _recovery(ends, seed, outages, 1 if quick else 4)
     with attempt("two daemons and a hub"), running("ether", (1, 2)) as ends:
-        beside = {row.name: row.value for row in _tables(ends, seed, quick)}
+        beside = {row.name: row.value for row in table_rows(ends, seed, quick)}
     with attempt("a daemon that hears itself"), running("loopback", (1,)) as ends:
         for i in range(1 if quick else PASSES):
             lateness = _lateness()
-            made = [*_tables(ends, seed + i, quick), *_limits(ends, seed + i, quick)]
+            made = [*table_rows(ends, seed + i, quick), *limit_rows(ends, seed + i, quick)]
             made[0] = replace(made[0], note=f"{made[0].note}; {lateness}")
             passes.append(made)
     for row in [_median_of(rows) for rows in zip(*passes, strict=True)]:
@@ -112,7 +112,7 @@ def _fresh_after(trace: Trace, end: float, limit_s: float) -> float:
     return float(fresh.min() - end) if len(fresh) else float("inf")
 
 
-def _tables(ends: Ends, seed: int, quick: bool) -> list[Row]:
+def table_rows(ends: Ends, seed: int, quick: bool) -> list[Row]:
     n = 100 if quick else 1000
     rng = np.random.default_rng(seed)
     flows = [
@@ -134,7 +134,7 @@ def _tables(ends: Ends, seed: int, quick: bool) -> list[Row]:
     ]
 
 
-def _limits(ends: Ends, seed: int, quick: bool) -> list[Row]:
+def limit_rows(ends: Ends, seed: int, quick: bool) -> list[Row]:
     """Bandwidth, and urgent messages while 10 MB wait."""
     rng = np.random.default_rng(seed)
     seconds = 1.0 if quick else 8.0

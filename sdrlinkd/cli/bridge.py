@@ -58,7 +58,7 @@ def foxglove(
     def started(bound: int) -> None:
         shown = f"[{host}]" if ":" in host else host
         typer.echo(f"Foxglove connects to ws://{shown}:{bound}")
-        for sentence in _meanings(host, patterns):
+        for sentence in meanings(host, patterns):
             typer.echo(sentence, err=True)
 
     log_to_stderr(logging.INFO)
@@ -68,7 +68,7 @@ def foxglove(
         runner.run(work)
 
 
-def _meanings(host: str, patterns: list[str]) -> list[str]:
+def meanings(host: str, patterns: list[str]) -> list[str]:
     """What the address and the patterns mean for who may see and who may send."""
     allowed = ", ".join(patterns)
     if not _is_local(host):

@@ -18,6 +18,7 @@ __all__ = [
 ]
 
 CONSTANTS: dict[str, tuple[ModuleType, str]] = {
+    "channel": (channels, "Channel"),
     "most_channels": (channels, "MOST_CHANNELS"),
     "most_kept_bytes": (channels, "MOST_KEPT_BYTES"),
 }

@@ -99,8 +99,8 @@ class RawRadio:
                 return message
         raise AssertionError("the hub says nothing")
 
-    def join(self, node, who="made by hand"):
-        """Join as a radio would; returns the token."""
+    def greet(self, node, who="made by hand"):
+        """Ask to join as a radio would."""
         hello = protocol.Hello(
             version=protocol.VERSION,
             node=node,
@@ -109,6 +109,10 @@ class RawRadio:
             frequency_hz=TUNING.frequency_hz,
         )
         self.ask(hello)
+
+    def join(self, node, who="made by hand"):
+        """Join as a radio would; returns the token."""
+        self.greet(node, who)
         return self.hear(protocol.Welcome).token
 
     def vanish(self):
@@ -199,7 +203,7 @@ class RadioOnHub(EtherRadio):
         hub = self._stack.enter_context(served)
         self._listener = Listener(self._folder)
         await super().open(tuning)
-        began_s, listens_s = (hub._medium.time(node, 0) for node in (NODE, LISTENER))
+        began_s, listens_s = (hub.medium.time(node, 0) for node in (NODE, LISTENER))
         self._first = round((began_s - listens_s) * tuning.rate_hz)
 
     async def close(self):

@@ -63,13 +63,14 @@ def test_a_recording_that_is_cut_off_reads(tmp_path):
     writer.close()
 
 
-def test_metadata_that_cannot_be_written_leave_those_there_were(annotated):
-    before = metadata(annotated)
-    writer = RecordingWriter(annotated.with_name("other"), "ci8", RATE, 0)
-    writer._meta_path = annotated.with_suffix(".sigmf-meta")
-    annotated.with_suffix(".sigmf-part").symlink_to("/dev/full")
+def test_metadata_that_cannot_be_written_leave_those_there_were(tmp_path):
+    path = tmp_path / "rec"
+    writer = RecordingWriter(path, "ci8", RATE, 0)
+    writer.describe([BURST])
+    before = metadata(path)
+    path.with_suffix(".sigmf-part").symlink_to("/dev/full")
     with pytest.raises(BackendError, match=r"rec.sigmf-meta: cannot be written \(No space left"):
-        writer.describe([BURST])
+        writer.describe([BURST, GAP])
     writer.close()
-    assert metadata(annotated) == before
-    assert not annotated.with_suffix(".sigmf-part").exists()
+    assert metadata(path) == before
+    assert not path.with_suffix(".sigmf-part").exists()

@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from backends import TxBurst, TxOutcome
-from backends.testing import MAX_WAITING
+from backends.testing import MAX_WAITING, BlockFeed
 from tests.backends.cases import assert_only, every_radio, not_in_lockstep, transmitters
 from tests.backends.radios import N, hand_over, noise, opened, take, turn
 
@@ -58,7 +58,8 @@ async def test_closing_ends_blocks_and_the_thread(case, tmp_path):
 @every_radio
 async def test_a_closed_radio_leaves_nothing_on_the_event_loop(case, tmp_path):
     """Its consumer may still be busy; a watched descriptor may soon be reused."""
-    watched = asyncio.get_running_loop()._selector.get_map()
+    # asyncio has no public name for what it watches.
+    watched = asyncio.get_running_loop()._selector.get_map()  # noqa: SLF001
     async with opened(case.make(tmp_path)) as radio:
         before = set(watched)
         blocks = radio.blocks()
@@ -123,19 +124,20 @@ async def test_a_consumer_that_went_away_does_not_keep_a_radio_open(case, tmp_pa
 
 
 @not_in_lockstep
-async def test_few_blocks_wait_for_a_consumer_that_stopped(case, tmp_path):
-    radio = case.make(tmp_path)
-    made, full = [], threading.Event()
-    make = radio._feed._next_block
+async def test_few_blocks_wait_for_a_consumer_that_stopped(case, tmp_path, monkeypatch):
+    made, full, fed = [], threading.Event(), BlockFeed.__init__
 
-    def counted():
-        made.append(make())
-        if len(made) > MAX_WAITING:
-            full.set()
-        return made[-1]
+    def feed(self, next_block, *more, **named):
+        def counted():
+            made.append(next_block())
+            if len(made) > MAX_WAITING:
+                full.set()
+            return made[-1]
 
-    radio._feed._next_block = counted
-    async with opened(radio):
+        fed(self, counted, *more, **named)
+
+    monkeypatch.setattr(BlockFeed, "__init__", feed)
+    async with opened(case.make(tmp_path)) as radio:
         blocks = radio.blocks()
         await take(blocks, 1)
         assert await asyncio.to_thread(full.wait, 20)

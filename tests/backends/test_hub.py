@@ -31,6 +31,7 @@ from tests.backends.radios import (
     opened,
     send,
     take,
+    turn,
 )
 
 pytestmark = pytest.mark.usefixtures("at_ease")
@@ -51,7 +52,7 @@ async def test_radios_join_hear_each_other_and_leave(tmp_path):
         async with opened(EtherRadio(hub_in(tmp_path), 7, "the seventh")) as one:
             async with opened(EtherRadio(hub_in(tmp_path), 9, "the ninth")) as other:
                 assert ask(tmp_path).nodes == {7: "the seventh", 9: "the ninth"}
-                begins_s = [hub._medium.time(node, 0) for node in (7, 9)]
+                begins_s = [hub.medium.time(node, 0) for node in (7, 9)]
                 burst = TxBurst(10_000, noise(300))
                 hearing = asyncio.ensure_future(take(other.blocks(), 12_000))
                 (report,), _ = await send(one, one.blocks(), [burst])
@@ -71,7 +72,7 @@ async def test_a_block_ends_where_a_burst_has_arrived_unless_it_is_late(tmp_path
             opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio,
             opened(EtherRadio(hub_in(tmp_path), 2, "")) as other,
         ):
-            apart = round((hub._medium.time(2, 0) - hub._medium.time(1, 0)) * RATE)
+            apart = round((hub.medium.time(2, 0) - hub.medium.time(1, 0)) * RATE)
             burst = TxBurst(9000, noise(730))
             sending = asyncio.ensure_future(send(other, other.blocks(), [burst]))
             taken = await take(radio.blocks(), apart + 12_000)
@@ -171,7 +172,7 @@ async def test_a_radio_that_finds_no_hub_waits_until_there_is_one(tmp_path):
     """Within its patience."""
     radio = EtherRadio(hub_in(tmp_path), 1, "the early one")
     opening = asyncio.ensure_future(radio.open(TUNING))
-    await until(lambda: hasattr(radio, "_down"))
+    await turn()
     assert radio.detail == "no hub yet"
     with serving(tmp_path):
         await opening

@@ -28,7 +28,7 @@ async def drive(folder, node, until, react):
     async with opened(EtherRadio(hub_in(folder), node, f"robot {node}")) as radio:
         async for block in radio.blocks():
             taken.append(block)
-            await react(radio, block)
+            await react(node, radio, block)
             if block.index + block.n >= until:
                 break
     return taken
@@ -62,8 +62,8 @@ def hear_a_run(folder, seed, dawdling):
     chances, idle = {node: Random(node) for node in radios}, Random(dawdling)
     reports = {node: [] for node in radios}
 
-    async def react(radio, block):
-        node, chance = radio._node, chances[radio._node]
+    async def react(node, radio, block):
+        chance = chances[node]
         end = block.index + block.n
         for _ in range(chance.choice([0, 0, 0, 1, 2])):
             burst = TxBurst(end + chance.randrange(3 * N), noise(chance.randrange(1, 500), end))
@@ -244,21 +244,22 @@ async def test_in_whatever_order_bursts_come_in_they_sound_the_same(tmp_path):
     for order in ([1, 2, 3], [3, 1, 2], [2, 3, 1]):
         folder = tmp_path / "".join(map(str, order))
         with (
-            lockstep(folder, dict.fromkeys((1, 2, 3, 4), RadioParams())) as hub,
+            lockstep(folder, dict.fromkeys((1, 2, 3, 4), RadioParams())),
             contextlib.ExitStack() as stack,
         ):
             raws = {node: stack.enter_context(RawRadio(folder)) for node in (1, 2, 3)}
             tokens = {node: raw.join(node) for node, raw in raws.items()}
-            for i, node in enumerate(order):
+            # All on one socket, which keeps their order.
+            push = raws[1].push
+            for node in order:
                 sent = protocol.Sent(
                     token=tokens[node], number=1, start=3 * N, latest=3 * N, late_seen=0
                 )
-                raws[node].push(sent, noise(150, node).tobytes())
-                await until(lambda hub=hub, n=i + 1: len(hub._bursts) == n)
+                push(sent, noise(150, node).tobytes())
             async with opened(EtherRadio(hub_in(folder), 4, "")) as radio:
                 coming = asyncio.ensure_future(take(radio.blocks(), 4 * N))
                 for step, node in itertools.product(range(5), raws):
-                    raws[node].push(protocol.Done(token=tokens[node], step=step))
+                    push(protocol.Done(token=tokens[node], step=step))
                 heard.append((await coming)[-1].samples)
     assert np.abs(heard[0][:150]).mean() > 0.05
     assert heard[0].tobytes() == heard[1].tobytes() == heard[2].tobytes()
@@ -288,11 +289,13 @@ async def test_nothing_overtakes_a_burst_that_was_late(tmp_path, exact):
 @pytest.mark.parametrize("turns", range(5))
 async def test_who_is_cancelled_just_when_something_comes_stops(tmp_path, turns):
     """No block comes, because another robot is missing."""
-    with lockstep(tmp_path, dict.fromkeys((1, 2), RadioParams())):
+    with lockstep(tmp_path, dict.fromkeys((1, 2), RadioParams())), RawRadio(tmp_path) as raw:
         async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             taking = asyncio.ensure_future(take(radio.blocks()))
             await asyncio.sleep(0.02)
-            radio._readable.set()
+            # The hub asks whether the radio is there, before it refuses another one as robot 1.
+            raw.greet(1)
+            raw.hear(protocol.Refused)
             for _ in range(turns):
                 await asyncio.sleep(0)
             taking.cancel()

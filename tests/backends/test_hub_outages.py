@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import itertools
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -18,7 +19,15 @@ from backends import (
     TxOutcome,
     hub_in,
 )
-from backends.testing import AIR, CONSTANTS, MAX_WAITING, protocol
+from backends.testing import (
+    AIR,
+    BEHIND_S,
+    CONSTANTS,
+    MAX_WAITING,
+    HubSockets,
+    Presence,
+    protocol,
+)
 from tests.backends.hubs import Listener, ask, serving, until
 from tests.backends.radios import BLOCK_S, RATE, TUNING, N, noise, opened, send, take
 
@@ -64,8 +73,10 @@ async def test_when_a_hub_comes_back_its_radios_go_on_behind_one_gap(tmp_path, m
         coming = asyncio.ensure_future(take_gap(blocks))
         await until(lambda: radio.counters["hub_outages"] == 1)
         assert "the hub is gone" in radio.detail
-        asked, say = [], radio._real_time._say
-        monkeypatch.setattr(radio._real_time, "_say", lambda each: asked.append(say(each)))
+        asked, is_to_ask = [], Presence.is_to_ask
+        monkeypatch.setattr(
+            Presence, "is_to_ask", lambda *now: is_to_ask(*now) and not asked.append(now)
+        )
         await until(lambda: len(asked) > 5)
         with serving(tmp_path):
             taken += await coming
@@ -100,7 +111,14 @@ async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave
             assert [each.outcome for each in reports] == [TxOutcome.LATE, TxOutcome.SENT]
             lost = [radio.send(TxBurst(FAR, noise(10)))]
             await take(blocks, 1)
-        coming = asyncio.ensure_future(take(blocks, FAR))
+        end = 0
+
+        async def follow():
+            nonlocal end
+            async for block in blocks:
+                end = block.index + block.n
+
+        coming = asyncio.ensure_future(follow())
         await until(lambda: radio.counters["hub_outages"] == 1)
         lost.append(radio.send(TxBurst(0, noise(10))))
         # The second hub stays, however slow the machine is.
@@ -109,8 +127,8 @@ async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave
             assert {(await each).outcome for each in lost} == {TxOutcome.LOST}
             assert ask(tmp_path).bursts == 0, "what was sent in vain stays where it is"
             # What is sent before the radio knows of the new hub is lost, too.
-            await until(lambda: not radio._is_away)
-            begin = radio._antenna.end + 400 * N
+            await until(lambda: not radio.trouble)
+            begin = end + 400 * N
             report = await radio.send(TxBurst(begin, noise(300), latest=begin))
             assert report == (TxOutcome.SENT, begin, begin + 300)
             assert ask(tmp_path).bursts == 1
@@ -134,20 +152,21 @@ async def test_a_hub_that_comes_back_may_refuse(tmp_path):
         assert (await sending).outcome is TxOutcome.LOST
 
 
-async def test_a_hub_that_was_silent_but_knows_its_radios_is_not_joined_again(tmp_path):
+async def test_a_hub_that_was_silent_but_knows_its_radios_is_not_joined_again(
+    tmp_path, monkeypatch
+):
     """The radio's count goes on, and what was handed over meanwhile leaves."""
-    with serving(tmp_path) as hub:
+    with serving(tmp_path):
         async with opened(EtherRadio(hub_in(tmp_path), 1, "the radio")) as radio:
             blocks = radio.blocks()
             taken = await take(blocks, 10 * N)
-            take_all, go_on = hub._sockets.take, threading.Event()
+            take_all, go_on = HubSockets.take, threading.Event()
 
-            def stall(*takers):
-                hub._sockets.take = take_all
+            def stall(*to_take):
                 go_on.wait()
-                take_all(*takers)
+                take_all(*to_take)
 
-            hub._sockets.take = stall
+            monkeypatch.setattr(HubSockets, "take", stall)
             coming = asyncio.ensure_future(take(blocks, taken[-1].index + 60_000))
             await until(lambda: radio.counters["hub_outages"] == 1)
             sending = radio.send(TxBurst(0, noise(50)))
@@ -168,13 +187,11 @@ async def test_a_radio_that_does_not_read_misses_samples_and_hinders_nobody(tmp_
             blocks = radio.blocks()
             taken = await take(blocks, 1)
             began_s = ask(tmp_path).now_s
-            # The radio reads no more: its thread has no room for another block.
-            room = radio._feed._room
-            while room.acquire(blocking=False):
-                pass
-            await until(lambda: ask(tmp_path).now_s > began_s + 0.2)
-            room.release(MAX_WAITING)
+            # Nobody takes blocks: soon its thread has no room for another one.
+            await until(lambda: ask(tmp_path).now_s > began_s + 0.5)
             taken += await take_gap(blocks)
+            # From here on there are no more gaps, so the count is of those that were taken.
+            monkeypatch.setattr(*CONSTANTS["real_time_max_behind_s"], FAR)
             taken += await take(blocks, taken[-1].index + 20 * N)
             reports, more = await send(radio, blocks, [TxBurst(0, noise(100))])
             gone_s = ask(tmp_path).now_s - began_s
@@ -192,25 +209,24 @@ async def test_a_radio_that_does_not_read_misses_samples_and_hinders_nobody(tmp_
     assert len(others) >= gone_s * RATE
 
 
-async def test_a_burst_that_was_slow_begins_late_and_the_next_do_not(tmp_path):
+async def test_a_burst_that_was_slow_begins_late_and_the_next_do_not(tmp_path, monkeypatch):
     """Samples are made later from then on."""
     with serving(tmp_path) as hub:
         async with (
             opened(EtherRadio(hub_in(tmp_path), 2, "")) as other,
             opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio,
         ):
-            blocks, reply = radio.blocks(), hub._reply
+            blocks, reply = radio.blocks(), HubSockets.reply
             taken = await take(blocks, N)
             held = threading.Event()
 
-            def slowly(identity, message, samples=None):
+            def slowly(sockets, identity, message, samples):
                 if isinstance(message, protocol.Arriving):
-                    hub._reply = reply
                     held.wait()
-                return reply(identity, message, samples)
+                return reply(sockets, identity, message, samples)
 
-            hub._reply = slowly
-            apart_s = hub._medium.time(1, 0) - hub._medium.time(2, 0)
+            monkeypatch.setattr(HubSockets, "reply", slowly)
+            apart_s = hub.medium.time(1, 0) - hub.medium.time(2, 0)
             at = taken[-1].index + 20 * N
             sending = other.send(TxBurst(at + round(apart_s * RATE), noise(300)))
             hearing = asyncio.ensure_future(take(other.blocks(), 10**9))
@@ -223,7 +239,11 @@ async def test_a_burst_that_was_slow_begins_late_and_the_next_do_not(tmp_path):
             hearing.cancel()
             await asyncio.wait([hearing])
             assert radio.counters["bursts_slow"] == 1
-            assert radio._real_time._behind_s > 0.0003
+            made_s = []
+            while len(made_s) < 3 * MAX_WAITING:
+                (block,) = await take(blocks, 1)
+                made_s.append(1e-9 * (time.monotonic_ns() - block.host_ns))
+            assert min(made_s) > BEHIND_S + 50 / RATE
     where = np.flatnonzero(np.abs(np.concatenate([block.samples for block in taken])) > 1e-3)
     assert len(where) > 290, "it is heard as a whole"
     assert where[0] >= late_from
@@ -239,14 +259,14 @@ async def test_a_radio_a_little_behind_gets_larger_blocks_and_loses_nothing(tmp_
             opened(EtherRadio(hub_in(tmp_path), 2, "")) as other,
             opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio,
         ):
-            apart_s = hub._medium.time(1, 0) - hub._medium.time(2, 0)
+            apart_s = hub.medium.time(1, 0) - hub.medium.time(2, 0)
             at = 9000 + round(apart_s * RATE)
             other.send(mark._replace(start=at, latest=at))
             blocks = radio.blocks()
             sends = [radio.send(TxBurst(begin, noise(700), latest=begin)) for begin in begins]
             taken = await take(blocks, 1)
             # The radio reads no more until all of it is long over.
-            await until(lambda: ask(tmp_path).now_s - hub._medium.time(1, 0) > 16_000 / RATE)
+            await until(lambda: ask(tmp_path).now_s - hub.medium.time(1, 0) > 16_000 / RATE)
             taken += await take(blocks, 16_000)
             reports = [await each for each in sends]
             assert radio.counters["samples_lost"] == 0

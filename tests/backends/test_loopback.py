@@ -1,8 +1,10 @@
 """A radio that hears itself: its clock, its noise, and what a slow reader misses."""
 
 import asyncio
+import gc
 import itertools
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -91,13 +93,16 @@ async def test_the_noise_has_the_power_asked_for(noise_dbfs):
 async def test_without_hearing_itself_there_is_only_noise():
     deaf = LoopbackRadio(noisy(), BLOCK_S, paced=False, hear_self=False)
     wanted = bursts(3)
+    sent = [weakref.ref(burst.samples) for burst in wanted]
     async with opened(deaf):
         reports, taken = await send(deaf, deaf.blocks(), wanted)
+    del wanted
     assert {report.outcome for report in reports} == {TxOutcome.SENT}
     samples = heard(taken)
     quiet = await stream(LoopbackRadio(noisy(), BLOCK_S, paced=False), len(samples))
     assert np.array_equal(samples, quiet)
-    assert not deaf._timeline._sent, "what is never heard is not kept"
+    gc.collect()
+    assert [each() for each in sent] == [None] * len(sent), "what is never heard is not kept"
 
 
 async def test_a_burst_is_heard_in_its_noise():
@@ -134,7 +139,7 @@ async def test_a_reader_far_behind_finds_a_gap(monkeypatch, few_waiting):
         await asyncio.sleep(0.35)
         taken.append(await gap_in(blocks, taken))
         # From here on there are no more blocks, so the count is of those that were taken.
-        radio._max_behind = FOREVER_S * RATE
+        monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", FOREVER_S)
         again = TxBurst(taken[-1].index + taken[-1].n + 10_000, noise(200))
         (report,), more = await send(radio, blocks, [again])
         taken += more

@@ -197,18 +197,20 @@ async def test_what_drivers_print_is_shown_to_those_who_ask(monkeypatch, tmp_pat
     assert bool(out + err) == bool(debug)
 
 
-def test_of_what_a_process_prints_the_last_line_is_kept():
+@pytest.mark.parametrize(
+    ("then", "last"),
+    [("print(3 * '\\n')", "last"), ("sys.stdout.write(5000 * 'U')", 4096 * "U")],
+    ids=["a blank line", "no newline"],
+)
+def test_of_what_a_process_prints_the_last_line_is_kept(then, last):
     driver_log = DriverLog()
-    code = (
-        "import sys; print('first'); print('last', file=sys.stderr); sys.stdout.write(5000 * 'U')"
-    )
+    code = f"import sys; print('first'); print('last', file=sys.stderr); {then}"
     with subprocess.Popen(
         [sys.executable, "-u", "-c", code], stdout=driver_log.fd, stderr=driver_log.fd
     ) as process:
         driver_log.begin()
         process.wait()
-    assert driver_log.last_line().startswith("UUU")
-    assert list(driver_log._lines)[:2] == ["first", "last"]
+    assert driver_log.last_line() == last
 
 
 @needs_radio

@@ -32,10 +32,9 @@ def bus(request):
 
 def radio(bus, tells, more=""):
     """A device that reports late bursts in the way `tells`."""
-    name = bus._path.name.removeprefix("soapy-loopback-")
     return SoapyRadio(
         SoapySettings(
-            device=f"driver=loopback,model=plain,noise_db=-200,mtu={N},bus={name},unit=0,"
+            device=f"driver=loopback,model=plain,noise_db=-200,mtu={N},bus={bus.name},unit=0,"
             f"late={tells},txlat_us={1e6 * NEEDED_S:g}{more}",
             rate_hz=0.0, frequency_hz=0.0, block_s=N / RATE, tx_enabled=True, tx_gain_db=40.0,
             rx_gain_db=20.0, lead_s=0.001, dc_block=False,

@@ -20,8 +20,8 @@ BROKEN = "libzenohc.so: cannot open shared object file"
 
 
 @pytest.fixture(autouse=True)
-def nothing_told(monkeypatch):
-    monkeypatch.setattr(absent, "_told", {})
+def nothing_told():
+    absent.forget()
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_a_peer_that_does_not_start_is_named_and_costs_no_row(monkeypatch, capsy
     def measure(target):
         def one(seed, quick):
             yield Row("before", 2.0, "ms", target, "less", 1)
-            peers = beside._each(
+            peers = beside.each(
                 ["zenoh_drop", "tcp_nodelay"], "one hop",
                 lambda name: len(beside.run_peer(name, flows, on, 1, drain_s=0.2)),
             )  # fmt: skip
@@ -96,8 +96,10 @@ def test_daemons_that_do_not_start_cost_their_own_rows_only(monkeypatch, capsys)
 
     monkeypatch.setattr(realtime, "running", running)
     monkeypatch.setattr(realtime, "SLEEPS", 1)
-    monkeypatch.setattr(realtime, "_tables", lambda *_: [Row("laser", 3.0, "ms", 2.0, "less", 1)])
-    monkeypatch.setattr(realtime, "_limits", limited)
+    monkeypatch.setattr(
+        realtime, "table_rows", lambda *_: [Row("laser", 3.0, "ms", 2.0, "less", 1)]
+    )
+    monkeypatch.setattr(realtime, "limit_rows", limited)
     rows = list(realtime.rows(1, quick=False))
     assert [(row.name, row.trials, row.ok) for row in rows] == [
         ("laser", 1, False), ("urgent", 1, True),

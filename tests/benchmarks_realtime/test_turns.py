@@ -24,8 +24,8 @@ LATE = Wanted("late", "ms", 5.0)
 
 
 @pytest.fixture(autouse=True)
-def nothing_told(monkeypatch):
-    monkeypatch.setattr(absent, "_told", {})
+def nothing_told():
+    absent.forget()
 
 
 class Watch:

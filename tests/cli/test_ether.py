@@ -105,7 +105,9 @@ def no_hub(make):
     """`make`, except that the hub must not run: nobody would stop it."""
 
     def made(*arguments):
-        make(*arguments)._sockets.close()
+        hub = make(*arguments)
+        hub.stop()
+        hub.run()
         raise AssertionError("this hub would serve")
 
     return made

@@ -8,7 +8,7 @@ from msgspec import inspect
 
 from benchmarks import page as benchmarks_page
 from benchmarks.kept import kept
-from sdrlinkd.__main__ import _parser
+from sdrlinkd.__main__ import make_parser
 from sdrlinkd.cli.app import run
 from sdrlinkd.config import Config
 from sdrlinkd.link import RX_PDU_REASONS, RX_REASONS, TX_REASONS
@@ -62,7 +62,7 @@ def test_reference_and_man_pages_are_those_of_the_code():
 
 def test_the_page_of_the_daemon_has_all_its_options():
     text = (DOCS / "reference/sdrlinkd.md").read_text()
-    for option in re.findall(r"--[a-z-]+", _parser().format_help()):
+    for option in re.findall(r"--[a-z-]+", make_parser().format_help()):
         assert option == "--help" or option in text, option
 
 

@@ -7,8 +7,9 @@ from sdrlinkd.fleet import Command, Commands, Fate, Order, Refusal
 TWIST = b"\0\1\0\0" + bytes(48)
 
 
-def take(commands, n=1, now=0.0, leads=False, op="desk", patience_s=0.0, **more):
-    return commands.take(2, "cmd_vel", Command(op, n, **more), TWIST, now, patience_s, leads=leads)
+def take(commands, n=1, now=0.0, leads=False, op="desk", patience_s=0.0, robot=2, **more):
+    command = Command(op, n, **more)
+    return commands.take(robot, "cmd_vel", command, TWIST, now, patience_s, leads=leads)
 
 
 def fate(name, n=1, gw=8, op="desk"):
@@ -84,6 +85,15 @@ def test_memory_is_bounded_whatever_operators_and_gateways_say():
     for n in range(10_000):
         take(commands, n=n, now=n / 1e4, op=f"op{n}")
         commands.told(3, fate("taken", n=n, op="other"), n / 1e4)
-    assert len(commands._known) <= 4096
-    assert len(commands._early) <= 4096
-    assert len(commands._newest) <= 256
+
+    def taken(n, op, robot=2):
+        return take(commands, n=n, now=1.0, op=op, leads=True, robot=robot)
+
+    # The last 4096 commands are known, and the newest numbers of the last 256 operators.
+    assert taken(5904, "op5904") is Refusal.AGAIN
+    assert isinstance(taken(5903, "op5903"), Order)
+    assert taken(9744, "op9745") is Refusal.OUTDATED
+    assert isinstance(taken(9742, "op9743"), Order)
+    # So is what was said of the last 4096 that have not come.
+    assert isinstance(taken(5903, "other", robot=3), Order)
+    assert taken(5904, "other", robot=3) is None

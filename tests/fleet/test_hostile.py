@@ -1,13 +1,14 @@
 """What others on the network put, say and declare ends no gateway, and makes it do nothing odd."""
 
 import time
+from io import BytesIO
 
 import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.calls import Service
+from sdrlinkd.calls import Service, told
 from sdrlinkd.fleet import Keys, Passed, encode, read_passed
 from sdrlinkd.fleet.testing import (
     BRIDGE,
@@ -142,8 +143,40 @@ def test_a_flood_pushes_out_the_oldest_and_adds_up():
     assert sum(ends.values()) == counts["bridge_taken"]
 
 
+SERVICES = [
+    Service("/set", "a/srv/Set", ""),
+    Service("/go/_action/get_result", "a/action/Go_GetResult", ""),
+    Service("/go/_action/cancel_goal", "a/action/Go_CancelGoal", ""),
+]
+
+
+class Served:
+    """A graph and a session that hand over to `ask` what is asked of robot 2's services."""
+
+    domain = 0
+
+    def __init__(self):
+        self._served = {}
+
+    def open(self, *_):
+        return BytesIO()  # something to close
+
+    def serve(self, key, take):
+        self._served[key] = take
+        return lambda: None
+
+    def ask(self, name, question):
+        (take,) = [each for key, each in self._served.items() if f"/robot_2{name}/" in key]
+        take(question)
+
+
 def calls(leads=True):
-    return Calls(None, None, ["*"], None, lambda _: leads)
+    """(calls, what is served of robot 2)."""
+    served = Served()
+    made = Calls(served, served, ["*"], None, lambda _: leads)
+    made.offer(2, told(SERVICES))
+    made.serve([2])
+    return made, served
 
 
 def question(ended):
@@ -153,28 +186,30 @@ def question(ended):
 
 
 def test_results_that_take_long_leave_room_for_calls_and_for_cancelling():
-    made, ended = calls(), []
+    (made, served), ended = calls(), []
     for kind, most in (("get_result", MOST_RESULTS), ("cancel_goal", MOST_ASKED)):
-        service = Service(f"/go/_action/{kind}", "a/action/Go_X", "")
         for _ in range(most + 10):
-            made._ask(2, service, question(ended))
+            served.ask(f"/go/_action/{kind}", question(ended))
     assert ended == ["drop"] * 20
-    made._ask(2, Service("/set", "a/srv/Set", ""), question(ended))
-    assert len(made._asked) == MOST_RESULTS + MOST_ASKED + 1
+    served.ask("/set", question(ended))
+    assert made.counts["calls_not_taken"] == 20
     made.forget(2)
-    assert not made._asked
     assert ended == ["drop"] * (20 + MOST_RESULTS + MOST_ASKED + 1)
+    # Now there is room again.
+    for _ in range(MOST_RESULTS):
+        served.ask("/go/_action/get_result", question(ended))
+    assert made.counts["calls_not_taken"] == 20
 
 
 def test_a_gateway_that_does_not_lead_any_more_makes_no_call():
-    made, ended = calls(leads=False), []
-    made._ask(2, Service("/set", "a/srv/Set", ""), question(ended))
+    (made, served), ended = calls(leads=False), []
+    served.ask("/set", question(ended))
     assert ended == ["drop"]
     assert made.counts["calls_not_taken"] == 1
 
 
 @given(st.binary())
 def test_any_packet_and_any_offer_can_be_heard(octets):
-    made = calls()
+    made, _ = calls()
     made.hear(2, octets)
     made.offer(2, octets)

@@ -45,7 +45,8 @@ def desk(start_fleet):
 
     fleet.node = node
     yield fleet
-    if (used := ZenohSession._instance) is not None:
+    # The package keeps one session for the whole process, and tells of it nowhere.
+    if (used := ZenohSession._instance) is not None:  # noqa: SLF001
         used.close()
 
 

@@ -9,7 +9,7 @@ import pytest
 from docs.site import foxglove_layout
 from sdrlinkd.adapters import Fix, Place, cdr_from_fields, read_place
 from sdrlinkd.cli import run
-from sdrlinkd.cli.bridge import _meanings
+from sdrlinkd.cli.bridge import meanings
 from sdrlinkd.extras import hint
 from sdrlinkd.foxglove import BridgeReport, json_schema, judge
 from sdrlinkd.reports import Snapshot
@@ -120,9 +120,9 @@ def test_a_missing_sdk_and_a_bad_address_are_one_sentence(monkeypatch, capsys):
 
 
 def test_the_command_says_who_may_see_and_send():
-    assert _meanings("127.0.0.1", []) == _meanings("::1", []) == _meanings("localhost", []) == []
-    assert "a page in its browser" in _meanings("127.0.0.1", ["/robot_2/*"])[0]
-    (open_,) = _meanings("0.0.0.0", [])
+    assert meanings("127.0.0.1", []) == meanings("::1", []) == meanings("localhost", []) == []
+    assert "a page in its browser" in meanings("127.0.0.1", ["/robot_2/*"])[0]
+    (open_,) = meanings("0.0.0.0", [])
     assert open_.startswith("anybody who reaches 0.0.0.0 sees all that robots send: there is no")
-    (both,) = _meanings("192.0.2.1", ["/robot_2/*"])
+    (both,) = meanings("192.0.2.1", ["/robot_2/*"])
     assert "sees all that robots send, and may command /robot_2/*: there" in both

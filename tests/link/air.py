@@ -113,7 +113,7 @@ class Air:
     def offer(self, node_id, at, qos=Qos.DEFAULT, length_s=None):
         """Add a message that waits from `at` on."""
         message = Message(qos, at, self.longest_s if length_s is None else length_s)
-        self._schedule(at, self._arrive, self.nodes[node_id], message)
+        self.schedule(at, self._arrive, self.nodes[node_id], message)
 
     def offer_randomly(self, until_s, per_s, classes=tuple(Qos), fixed=False, begin_s=0.0):
         """Add Poisson arrivals at each node, `per_s` of each class."""
@@ -165,7 +165,7 @@ class Air:
             self.hears(to, one) and self.hears(to, other) for to in listeners
         )
 
-    def _schedule(self, at, what, *arguments):
+    def schedule(self, at, what, *arguments):
         self._count += 1
         heappush(self._events, (at, self._count, what, arguments))
 
@@ -177,7 +177,7 @@ class Air:
             due = node.true(node.beacon_at) - self.traits.lead_s - AHEAD_S
             at += LOOK_S * max(0, floor((due - at) / LOOK_S))
         node.looks_at = at
-        self._schedule(at + self._delay_s(), self._look, node, at)
+        self.schedule(at + self._delay_s(), self._look, node, at)
 
     def _delay_s(self):
         return 0.0 if self.traits.is_lockstep else self.rng.uniform(0, 0.002)
@@ -186,7 +186,7 @@ class Air:
         if node.is_on and block_end == node.looks_at:
             node.until = block_end
             node.looks_at = INFINITE
-            self._decide(t, node)
+            self.decide(t, node)
             self._look_next(node, block_end + LOOK_S)
 
     def _arrive(self, t, node, message):
@@ -196,9 +196,9 @@ class Air:
                 blocks = floor((t - self._delay_s() - node.phase) / LOOK_S)
                 node.until = max(node.until, node.phase + blocks * LOOK_S)
                 self._look_next(node, node.phase + (blocks + 1) * LOOK_S)
-            self._decide(t, node)
+            self.decide(t, node)
 
-    def _decide(self, t, node):
+    def decide(self, t, node):
         """Decide as the modem does: whenever something waits, for a time in the near future."""
         lead_s = self.traits.lead_s
         while True:

@@ -2,7 +2,8 @@
 
 from random import Random
 
-from sdrlinkd.link.access import CLOCK_ERROR_S
+from sdrlinkd.link import Qos, Sensed
+from sdrlinkd.link.access import CLOCK_ERROR_S, Wish
 from tests.link.air import Air
 from tests.link.radios import params
 
@@ -27,7 +28,13 @@ def make_air(n, traits, seed, reuse=False, ppm=20.0, **more):
 def lengths_s(air):
     """(slot, guard) in s."""
     access = next(iter(air.nodes.values())).access
-    return access._slot_s, access._guard_s
+    return access.slot_s, access.guard_s
+
+
+def schedule_of(access):
+    """The check of its times that a robot with this policy announces, here from 9 s on."""
+    access.slot(Wish(9.0, Qos.URGENT, 0.001, Sensed(9.0)))
+    return access.frame(9.0).schedule
 
 
 def places(air, root):
@@ -35,6 +42,6 @@ def places(air, root):
     node, nodes = air.nodes[root], air.params.nodes
     slot_s, _ = lengths_s(air)
     for burst in air.bursts:
-        since = node.clock(burst.begin) - node.access._origin
+        since = 1e-6 * node.access.frame(node.clock(burst.begin)).phase_us
         number = (since + CLOCK_ERROR_S) // slot_s
         yield nodes[int(number) % len(nodes)], since - number * slot_s, burst

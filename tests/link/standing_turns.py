@@ -46,7 +46,7 @@ def in_turns(access, **kinds):
     air = Air(**kinds)
     for link in air.links.values():
         use(link, access())
-    air._next_burst = lambda link, now: link.next_burst(
+    air.next_burst = lambda link, now: link.next_burst(
         Opportunity(now, airtime_s, lambda _mcs, longest_s: int(longest_s / PDU_S))
     )
     return air

@@ -16,7 +16,7 @@ class Steps:
         self.bursts = []
         """All bursts as (time of the request, sender, burst)."""
         self._step_s = step_s
-        self._next_burst = next_burst
+        self.next_burst = next_burst
         self._most_bursts = most_bursts
         self._under_way = []
 
@@ -45,7 +45,7 @@ class Steps:
         for robot, link in self.links.items():
             link.handle_timers(self.now)
             for _ in range(self._most_bursts):
-                burst = self._next_burst(link, self.now)
+                burst = self.next_burst(link, self.now)
                 if burst is None:
                     break
                 self._send(robot, link, burst)

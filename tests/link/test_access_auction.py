@@ -259,13 +259,13 @@ def test_a_mini_slot_that_was_missed_ends_our_part_too():
         air = make_air(4, seed)
         air.saturate(200, qos=Qos.BULK)
         air.offer_randomly(3.0, per_s=20, classes=(Qos.URGENT, Qos.DEFAULT))
-        chance, decide = Random(seed), air._decide
+        chance, decide = Random(seed), air.decide
 
         def stalls(t, node, chance=chance, decide=decide):
             if chance.random() > 0.02:
                 decide(t, node)
 
-        air._decide = stalls
+        air.decide = stalls
         assert len(air.run(3.0)) > 300
         air.assert_nobody_clashes(SETTLED_S)
 
@@ -280,7 +280,7 @@ def test_what_was_told_and_is_gone_is_not_sent_for_later():
             at = SETTLED_S + 0.1 * k + air.rng.uniform(0, 0.02)
             air.offer(3, at, Qos.DEFAULT, SHORT_S)
             air.offer(3, at, Qos.DEFAULT, SHORT_S)
-            air._schedule(at + 0.012, lambda t, node: node.waiting.clear(), air.nodes[3])
+            air.schedule(at + 0.012, lambda t, node: node.waiting.clear(), air.nodes[3])
         air.run(SETTLED_S + 3.2)
         air.assert_nobody_clashes()
 

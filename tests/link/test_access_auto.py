@@ -16,6 +16,7 @@ from sdrlinkd.link import (
 )
 from sdrlinkd.wire import Frame
 from tests.link.radios import LOCKSTEP, PACED, TX_WINDOWS, params
+from tests.link.slots import schedule_of
 from tests.link.world import make_link, next_burst
 
 LONGEST_S = 0.005
@@ -186,7 +187,7 @@ def test_turns_by_request_need_room_for_a_plan():
 
 def test_minislots_wait_for_those_of_the_higher_level_and_say_so():
     access = settled(params("minislot", [1, 2]), USRP).access
-    assert access.turn_s == pytest.approx(3 * access._minislot_s)
+    assert access.turn_s == pytest.approx(3 * access.minislot_s)
     assert access.mean_wait_s(Qos.DEFAULT) >= access.turn_s
 
 
@@ -210,7 +211,8 @@ def test_robots_that_came_to_different_policies_are_told():
         slots.beacon(2, 2.0)
     assert "robot 2 keeps no tdma schedule" in notices_of(slots)
     assert notices_of(slots, 70.0) == "", "it left, or was told"
-    slots.take_frame(2, Frame(2, 0, slots._times_crc, 0), 1.0)
+    twin = settled(params("tdma", [1, 2]), USRP).access
+    slots.take_frame(2, Frame(2, 0, schedule_of(twin), 0), 1.0)
     assert notices_of(slots) == ""
     slots.take_frame(2, Frame(2, 0, 0x1234, 0), 2.0)
     assert "a different tdma schedule" in notices_of(slots)

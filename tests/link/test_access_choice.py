@@ -19,6 +19,7 @@ from sdrlinkd.link.access import (
     make_access,
 )
 from tests.link.radios import LOCKSTEP, PACED, params
+from tests.link.slots import schedule_of
 from tests.link.world import make_link
 
 POLICIES = {"none": Free, "csma": Csma, "minislot": MiniSlots, "tdma": Tdma}
@@ -95,7 +96,7 @@ def test_csma_need_not_know_who_there_is():
 
 
 def test_too_short_a_minislot_is_refused_with_what_the_radio_needs():
-    least_s = make(params("minislot", [1, 2]), traits=PACED)._minislot_s
+    least_s = make(params("minislot", [1, 2]), traits=PACED).minislot_s
     assert least_s >= PACED.lead_s + PACED.react_s + PACED.detect_s
     make(params("minislot", [1, 2], minislot_s=least_s), traits=PACED)
     message = refusal(params("minislot", [1, 2], minislot_s=0.9 * least_s), traits=PACED)
@@ -107,7 +108,7 @@ def test_too_short_a_minislot_is_refused_with_what_the_radio_needs():
 
 def test_too_short_a_guard_is_refused_with_what_the_radio_needs():
     traits = LOCKSTEP._replace(turnaround_s=300e-6, index_error_s=20e-6)
-    made_s = make(params("tdma", [1]), traits=traits)._guard_s
+    made_s = make(params("tdma", [1]), traits=traits).guard_s
     assert made_s >= 300e-6 + 40e-6 + MARGIN_S
     make(params("tdma", [1], guard_s=350e-6), traits=traits)
     message = refusal(params("tdma", [1], guard_s=300e-6), traits=traits)
@@ -147,7 +148,7 @@ def test_who_is_heard_too_late_is_refused_and_tdma_named_instead(policy):
         for part in ("bursts only after 700 ms", "allowed: at most 100 ms: use tdma"):
             assert part in message
     access = make(params(policy, [1, 2]), traits=SLOW._replace(lead_s=0.05, react_s=0.04))
-    apart_s = access._slottime_s if policy == "csma" else access._minislot_s
+    apart_s = access.slottime_s if policy == "csma" else access.minislot_s
     assert 0.9 * LONGEST_APART_S < apart_s <= LONGEST_APART_S
     make(params("tdma", [1, 2]), traits=SLOW)
 
@@ -164,7 +165,7 @@ def test_without_turns_a_radio_that_turns_round_slowly_is_told_of(turnaround_s, 
 def test_a_slot_that_is_over_before_it_is_known_to_be_unused_is_not_reused():
     """Its owner may then begin late in it, so nobody relies on hearing the owner by then."""
     never = make(params("tdma", [1, 2], minislot_s=0.1, slot_s=0.02))
-    assert not never._reuse
+    assert not never.step_s
     slots = [never.slot(Wish(1e-3 * i, Qos.BULK, 0.001, Sensed())) for i in range(600)]
     begun = [slot for slot in slots if slot is not None]
     assert {round(max(0.0, slot.late_end - 0.001 - slot.start), 3) for slot in begun} >= {
@@ -178,8 +179,9 @@ def test_minislots_too_short_to_hear_each_other_are_not_reused_in_tdma():
     """They are never refused: without reuse they are not needed."""
     tight = make(params("tdma", [1, 2], minislot_s=1e-4))
     wide = make(params("tdma", [1, 2], minislot_s=0.01, slot_s=0.02))
-    assert (tight._reuse, wide._reuse) == (False, True)
-    assert make(params("tdma", [1, 2], reuse=False))._times_crc == tight._times_crc
+    assert (bool(tight.step_s), bool(wide.step_s)) == (False, True)
+    without = make(params("tdma", [1, 2], reuse=False))
+    assert schedule_of(without) == schedule_of(tight)
 
 
 @pytest.mark.parametrize("policy", ["minislot", "csma", "tdma"])
@@ -188,12 +190,10 @@ def test_who_began_a_slot_earlier_a_kilometre_away_is_heard_in_time(policy, trai
     """A burst is decided when one begun a slot earlier has been on the air long enough here."""
     wanted = params(policy, [2, 1], persist=1.0, slot_s=0.2)
     access = make(wanted, traits=traits)
-    if policy == "tdma":
-        # The slot of robot 2, which is silent.
-        access._origin, access._is_running = 10.0, True
-    else:
+    # With tdma, it begins the schedule itself, with the slot of robot 2, which is silent.
+    if policy != "tdma":
         access.heard(2, 9.9, False)
-    apart_s = access._slottime_s if policy == "csma" else access._minislot_s
+    apart_s = access.slottime_s if policy == "csma" else access.minislot_s
     step_s = 1e-6
     for step in range(int(0.1 / step_s)):
         until = 10.0 + step * step_s

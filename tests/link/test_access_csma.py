@@ -129,25 +129,26 @@ def test_it_waits_until_the_channel_is_idle():
 def test_a_slot_is_kept_to_while_nothing_changes():
     """A new draw at each query would change the probabilities of all slots."""
     for seed in range(20):
-        access = make(seed, persist=0.1)
-        slot, until = None, 5.0
-        while slot is None:
-            drawn = access._drawn if access.backoff.name == "DRAWN" else None
-            slot = access.slot(Wish(until + SLOT / 4, Qos.DEFAULT, 0.001, Sensed(until, 5.0)))
-            if drawn is not None:
-                assert slot is None or slot.start == drawn[2]
-                assert slot is not None or access._drawn == drawn
-            until += SLOT / 8
+        start = first_start(make(seed, persist=0.1), 5.0)
+        # A twin is asked at first, and then no more until that slot.
+        twin = make(seed, persist=0.1)
+        starts = {
+            slot.start
+            for until in (5.0, start - SLOT / 2)
+            if (slot := twin.slot(Wish(until + SLOT / 4, Qos.DEFAULT, 0.001, Sensed(until, 5.0))))
+        }
+        assert starts == {start}, f"seed {seed}"
 
 
 def test_a_busy_channel_or_another_class_draws_anew():
-    access = make(3, persist=0.01)
-    assert access.slot(Wish(5.001, Qos.BULK, 0.001, Sensed(5.0, 5.0))) is None
-    slow = access._drawn[2]
-    assert access.slot(Wish(5.001, Qos.URGENT, 0.001, Sensed(5.0, 5.0))) is None
-    assert access._drawn[2] < slow
-    assert access.slot(Wish(5.201, Qos.URGENT, 0.001, Sensed(5.2, 5.2))) is None
-    assert access._drawn[2] >= 5.2 + DWAIT
+    slow = first_start(make(3, persist=0.01), 5.0, Qos.BULK)
+    other_class, busy = make(3, persist=0.01), make(3, persist=0.01)
+    for access in (other_class, busy):
+        assert access.slot(Wish(5.001, Qos.BULK, 0.001, Sensed(5.0, 5.0))) is None
+    assert first_start(other_class, 5.0, Qos.URGENT) < slow
+    slots = (first_start(busy, 5.2007, Qos.BULK) - 5.2007 - DWAIT) / SLOT
+    assert slots == pytest.approx(round(slots), abs=1e-6)
+    assert round(slots) >= WINDOWS[Qos.BULK][0]
 
 
 @pytest.mark.parametrize("sent_before", [False, True])

@@ -288,7 +288,8 @@ def test_the_phase_is_that_of_the_frame_at_any_time():
 def test_a_schedule_from_outside_the_nodes_is_ignored_and_told(src, root):
     access = begun(make(3), 1.0)
     before = access.state
-    access.take_frame(src, Frame(root, 0, access._times_crc, 5000), 1.1)
+    schedule = begun(make(1), 9.0).frame(9.0).schedule
+    access.take_frame(src, Frame(root, 0, schedule, 5000), 1.1)
     assert access.state == before
     (told,) = access.notices(1.2)
     assert told.startswith(f"robot {src} announces a tdma schedule and is ignored")

@@ -107,7 +107,7 @@ def test_an_urgent_message_waits_a_frame_at_most(traits, reuse):
 @pytest.mark.parametrize("turnaround_s", [0.0, 50e-6, 500e-6])
 def test_a_slot_is_made_so_long_that_its_guard_takes_a_tenth_at_most(longest_s, turnaround_s):
     access = make(1, LOCKSTEP._replace(turnaround_s=turnaround_s), longest_s, nodes=(1,))
-    slot_s, guard_s = access._slot_s, access._guard_s
+    slot_s, guard_s = access.slot_s, access.guard_s
     times = (9.0 + 1e-4 * step for step in range(int(2e4 * slot_s)))
     slots = [access.slot(Wish(at, Qos.URGENT, longest_s, Sensed(at))) for at in times]
     rooms = [slot.end - slot.start for slot in slots if slot is not None]
@@ -120,7 +120,7 @@ def test_a_slot_is_made_so_long_that_its_guard_takes_a_tenth_at_most(longest_s, 
 def test_what_is_given_is_kept_to():
     given = params("tdma", (1, 2), slot_s=0.03, guard_s=0.002)
     access = make_access(given, 1, LOCKSTEP, LONGEST_S, Random(1))
-    assert (access._slot_s, access._guard_s, access.round_s) == (0.03, 0.002, 0.06)
+    assert (access.slot_s, access.guard_s, access.round_s) == (0.03, 0.002, 0.06)
     assert access.state.startswith("tdma: 2 slots of 30 ms, guard 2 ms; ")
 
 
@@ -139,7 +139,7 @@ def assert_alike(one, other, begin):
 def two_of_robot_2():
     """(the same policy twice, start of its slot)"""
     pair = make(2), make(2)
-    slot_s = pair[0]._slot_s
+    slot_s = pair[0].slot_s
     begin = 10.0 + 3 * slot_s
     for each in pair:
         root = make(1)
@@ -166,11 +166,11 @@ def test_a_burst_that_did_not_leave_takes_nothing_from_the_one_behind_it():
 
 
 def begun(access, since, for_s=0.2):
-    """Owners of the slots in which a robot begins that decides every 50 µs and hears nobody."""
+    """Owners of the slots in which one of three robots begins that hears nobody."""
     looks = (since + 5e-5 * i for i in range(int(for_s / 5e-5)))
     slots = (access.slot(Wish(at, Qos.BULK, 0.001, Sensed(at))) for at in looks)
-    numbers = ((slot.start - access._origin) / access._slot_s for slot in slots if slot)
-    return {access._nodes[floor(number + 1e-6) % 3] for number in numbers}
+    phases_us = [access.frame(slot.start).phase_us for slot in slots if slot]
+    return {(1, 2, 3)[floor(1e-6 * each / access.slot_s + 1e-3) % 3] for each in phases_us}
 
 
 def test_who_knows_of_a_robot_it_does_not_hear_uses_its_own_slots_only():

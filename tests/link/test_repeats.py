@@ -259,7 +259,7 @@ def test_where_a_burst_has_one_pdu_the_announcement_goes_ahead():
     def one_pdu(link, now):
         return link.next_burst(Opportunity(now, airtime_s, lambda _mcs, _s: 1))
 
-    air._next_burst = one_pdu
+    air.next_burst = one_pdu
     air.flow(1, 100)
     air.run(air.now + 0.5)
     assert sorted(air.numbers(2)) == list(range(100))

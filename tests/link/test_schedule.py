@@ -19,7 +19,7 @@ from sdrlinkd.link import (
     TopicPolicy,
 )
 from sdrlinkd.link.access import Free, Slot
-from sdrlinkd.link.schedule import Allowance, Forecasts, Limits, Shares
+from sdrlinkd.link.schedule import Allowance, Flow, Forecasts, Limits, Shares
 from tests.laws import law
 from tests.link.world import PDU_S, airtime_s, classes_queued, make_link, most_pdus, next_burst, use
 
@@ -220,9 +220,10 @@ def test_allowance_may_be_cut_for_less_urgent_classes():
 def test_made_up_robots_are_forgotten():
     forecasts = Forecasts()
     for i in range(5000):
-        forecasts.note(i, Qos.LATENCY, 0.001 * i)
-    assert len(forecasts._by_key) == 128
-    assert min(each.seen_at for each in forecasts._by_key.values()) > 4.8
+        for since in (0.0, 10.0, 20.0):
+            forecasts.note(Flow(i, i, 0), Qos.LATENCY, since + 0.001 * i)
+    kept = {node for node, _ in forecasts.of_team(25.0, 40.0)}
+    assert kept == set(range(5000 - 128, 5000))
 
 
 def test_a_lifespan_that_can_never_be_met_is_told():

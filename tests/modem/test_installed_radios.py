@@ -100,7 +100,7 @@ def test_its_name_is_among_those_allowed(acme):
 
 
 def test_a_configuration_of_ours_does_not_look_for_packages(acme, monkeypatch):
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda **_: pytest.fail("looked for"))
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: pytest.fail("looked for"))
     assert type(parse_config('backend = "loopback"\n[modem]\nmcs = 2')) is Config
 
 

@@ -5,6 +5,7 @@ import contextlib
 import mmap
 import os
 import signal
+import socket
 from random import Random
 
 import pytest
@@ -17,6 +18,7 @@ from sdrlinkd.errors import LinkAbsentError, UserError
 from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem import make_modem
 from sdrlinkd.modem.testing import CONSTANTS, MOST_PULSES, Page, Seen, Shown
+from sdrlinkd.spawn import EarlyModem, spawn_modem
 from tests.laws import law
 from tests.modem.links import Listener, bursts, config, send
 
@@ -74,54 +76,56 @@ def test_a_page_shows_what_was_written(
 @given(st.integers(0, 59), st.integers(1, 255))
 def test_a_record_that_is_half_written_is_not_read(at, change):
     fd = make_page()
-    writer, reader = Page(fd), Page(fd)
+    writer, reader, memory = Page(fd), Page(fd), mmap.mmap(fd, mmap.PAGESIZE)
     os.close(fd)
     before = Shown(Seen(1000, 1.0, 0.5), Sensed(1.0, 0.5, None), 900)
     writer.show(*before)
     assert reader.read() == before
-    writer._memory[at] ^= change
+    memory[at] ^= change
     assert reader.read() == before
     assert Page.read(writer) is None
-    writer.close()
-    reader.close()
+    for each in (writer, reader, memory):
+        each.close()
 
 
 @contextlib.asynccontextmanager
 async def opened(settings):
-    """(modem link, listener, its carry task, the id of its process)."""
-    modem, listener = make_modem(settings, 1, Random(1)), Listener()
+    """(modem link, listener, its carry task, its process)."""
+    spawned = spawn_modem()
+    modem = make_modem(settings, 1, Random(1), early=EarlyModem(spawned))
+    listener = Listener()
     listener.now = modem.now
     try:
         carry = await modem.open(listener)
         task = asyncio.ensure_future(carry())
-        yield modem, listener, task, modem._modem._process.pid
+        yield modem, listener, task, spawned
     finally:
         await modem.close()
         task.cancel()
         await asyncio.wait((task,))
 
 
-def is_running(pid):
+def is_running(spawned):
     with contextlib.suppress(ProcessLookupError):
-        os.kill(pid, 0)
+        os.kill(spawned.process.pid, 0)
         return True
     return False
 
 
 async def test_a_closed_modem_leaves_no_process():
-    async with opened(config(paced=True)) as (modem, _, _, pid):
-        assert is_running(pid)
+    async with opened(config(paced=True)) as (modem, _, _, spawned):
+        assert is_running(spawned)
         await modem.close()
-        assert not is_running(pid)
+        assert not is_running(spawned)
         await modem.close()
 
 
 async def test_signals_to_the_group_end_it_only_with_its_daemon():
     """Ctrl-C and systemd reach both; the daemon still sends what is queued."""
     sent = list(bursts(5, 3))
-    async with opened(config(paced=True)) as (modem, listener, _, pid):
+    async with opened(config(paced=True)) as (modem, listener, _, spawned):
         for number in (signal.SIGINT, signal.SIGTERM):
-            os.kill(pid, number)
+            os.kill(spawned.process.pid, number)
         send(modem, listener, sent)
         await listener.until(lambda: len(listener.settled_bursts) == len(sent))
         assert {outcome for _, outcome, _ in listener.settled_bursts} == {Outcome.SENT}
@@ -129,10 +133,10 @@ async def test_signals_to_the_group_end_it_only_with_its_daemon():
 
 async def test_when_it_is_killed_all_bursts_are_settled_once_and_the_link_is_absent():
     sent = list(bursts(6, 40))
-    async with opened(config(paced=True)) as (modem, listener, task, pid):
+    async with opened(config(paced=True)) as (modem, listener, task, spawned):
         send(modem, listener, sent)
         await listener.until(lambda: len(listener.settled_bursts) >= 5)
-        os.kill(pid, signal.SIGKILL)
+        os.kill(spawned.process.pid, signal.SIGKILL)
         with pytest.raises(LinkAbsentError, match="the modem process ended by signal 9"):
             await task
         before = modem.now()
@@ -147,25 +151,24 @@ async def test_when_it_is_killed_all_bursts_are_settled_once_and_the_link_is_abs
 async def test_a_process_that_hangs_is_ended(monkeypatch):
     monkeypatch.setattr(*CONSTANTS["hung_s"], 0.5)
     monkeypatch.setattr(*CONSTANTS["watch_s"], 0.1)
-    async with opened(config(paced=True)) as (modem, listener, task, pid):
+    async with opened(config(paced=True)) as (modem, listener, task, spawned):
         send(modem, listener, list(bursts(7, 3)))
         await listener.until(lambda: len(listener.settled_bursts) == 3)
-        os.kill(pid, signal.SIGSTOP)
+        os.kill(spawned.process.pid, signal.SIGSTOP)
         send(modem, listener, list(bursts(8, 3)))
         with pytest.raises(LinkAbsentError, match="the modem process hung and was ended"):
             await task
     assert len(listener.settled_bursts) == len(listener.taken)
-    assert not is_running(pid)
+    assert not is_running(spawned)
 
 
 async def test_it_ends_when_its_daemon_is_gone():
-    async with opened(config(paced=True)) as (modem, _, task, _pid):
-        # As if the daemon had been killed: its end of the socket is closed.
+    async with opened(config(paced=True)) as (_, _, task, spawned):
+        # As if the daemon had been killed: its end of the socket is closed, and nobody listens.
         task.cancel()
-        asyncio.get_running_loop().remove_reader(modem._modem._socket)
-        modem._modem._socket.close()
-        modem._modem._socket = None
-        assert await asyncio.to_thread(modem._modem._process.wait, 60) == 0
+        asyncio.get_running_loop().remove_reader(spawned.control)
+        spawned.control.shutdown(socket.SHUT_RDWR)
+        assert await asyncio.to_thread(spawned.process.wait, 60) == 0
 
 
 async def test_time_goes_on_after_a_restart():

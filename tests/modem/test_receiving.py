@@ -1,6 +1,7 @@
 """The receiver on its thread, and its position in the stream."""
 
 import asyncio
+import threading
 
 import numpy as np
 import pytest
@@ -50,11 +51,45 @@ async def test_every_event_comes_in_order_however_fast_blocks_come(size):
         pending = list(blocks(samples, size))
         for block in pending:
             await receiver.put(block)
-            assert receiver._blocks.qsize() <= MAX_BLOCKS
     await receiver.finish()
     receiver.stop()
     assert told.heard == 3 * sent
     assert len(told.ends) == 3 * len(pending) + 1
+    assert receiver.load.realtime_ratio > 0
+
+
+async def test_few_blocks_wait_for_a_receiver_that_is_slow():
+    samples, _ = make_air(1, 12)
+    more, held = blocks(samples, 64), threading.Event()
+    receiver = ReceiverThread(
+        make_receiving(),
+        1e6,
+        lambda *_: held.wait(),
+        wakes=True,
+        call=lambda deliver, *to: deliver(*to),
+    )
+    put, is_full = 0, asyncio.Event()
+
+    async def put_all():
+        nonlocal put
+        for block in more:
+            await receiver.put(block)
+            put += 1
+            if put == MAX_BLOCKS:
+                is_full.set()
+            await asyncio.sleep(0)
+
+    putting = asyncio.ensure_future(put_all())
+    try:
+        async with asyncio.timeout(60):
+            await is_full.wait()
+        for _ in range(100):
+            await asyncio.sleep(0)
+        assert put <= MAX_BLOCKS + 1, "one is at the receiver"
+    finally:
+        held.set()
+    await putting
+    await receiver.finish()
     assert receiver.load.realtime_ratio > 0
 
 

@@ -16,9 +16,9 @@ CDR = b"\0\1\0\0"
 SIZE = 128
 
 
-def spoken():
+def spoken(clear="refuse"):
     """A robot that has proven itself to another, and what it sent."""
-    team = Team(Robot(1, [KEY]), Robot(2, [KEY]))
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY], SecurityParams(mode="seal", clear=clear)))
     team.run(1.0)
     for number in range(20):
         team.robots[1].link.submit(0, CDR + bytes([number]), team.robots[1].clock(team.now))
@@ -42,9 +42,8 @@ hostile = st.one_of(
 @law(30)
 @given(st.sampled_from(["refuse", "accept"]), st.lists(hostile, max_size=60))
 def test_whatever_comes(clear, script):
-    team, sent = spoken()
+    team, sent = spoken(clear)
     robot = team.robots[2]
-    robot.sealing.opener._params = SecurityParams(mode="seal", clear=clear)
     before = list(robot.heard)
     for each in script:
         if isinstance(each, bytes):

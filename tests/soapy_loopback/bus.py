@@ -45,6 +45,7 @@ class Bus:
     """The shared memory of the bus `name`, created if absent, and removed when a `with` ends."""
 
     def __init__(self, name: str) -> None:
+        self.name = name
         self._path = Path(f"/dev/shm/soapy-loopback-{name}")
         self._file = self._path.open("a+b")
         if self._file.seek(0, os.SEEK_END) != SIZE:

@@ -73,7 +73,7 @@ class Csma(BusyChannel):
         super().__init__()
         self._robots = robots
         self.pause_s = self._dwait_s = dwait_s
-        self._slottime_s = slottime_s
+        self.slottime_s = slottime_s
         self._persist = persist
         self._detect_s = detect_s
         self._rng = rng
@@ -87,7 +87,7 @@ class Csma(BusyChannel):
     def state(self) -> str:
         """Policy, times and backoffs so far, for people."""
         return (
-            f"csma: DWAIT {self._dwait_s * 1e3:.3g} ms, SLOTTIME {self._slottime_s * 1e3:.3g} ms, "
+            f"csma: DWAIT {self._dwait_s * 1e3:.3g} ms, SLOTTIME {self.slottime_s * 1e3:.3g} ms, "
             f"PERSIST {self._persist:g}; {self._backoffs} backoffs"
         )
 
@@ -95,7 +95,7 @@ class Csma(BusyChannel):
         """Mean wait in s: DWAIT, the slots of the class, and the mean of the random slots."""
         waits, eagerness = WINDOWS[qos]
         passed = 1 / min(1.0, eagerness * self._persist) - 1
-        return self._dwait_s + (waits + passed) * self._slottime_s
+        return self._dwait_s + (waits + passed) * self.slottime_s
 
     def carries(self, burst_s: float) -> float:
         """Share of airtime of bursts that do not collide, less the slots that pass idle."""
@@ -103,7 +103,7 @@ class Csma(BusyChannel):
         chance, n = min(1.0, eagerness * self._persist), self._robots
         anybody = 1 - (1 - chance) ** n
         nobody_else = n * chance * (1 - chance) ** (n - 1) / anybody
-        idle_s = self._dwait_s + (waits + 1 / anybody - 1) * self._slottime_s
+        idle_s = self._dwait_s + (waits + 1 / anybody - 1) * self.slottime_s
         return nobody_else * burst_s / (burst_s + idle_s)
 
     def begins_first(self, qos: Qos, others: Qos, n: int) -> float:
@@ -128,7 +128,7 @@ class Csma(BusyChannel):
             start = self._draw(idle_since, earliest, qos)
             self.backoff = after(STEPS, self.backoff, Happens.DRAWS)
             self._drawn = (idle_since, qos, start)
-        if start > sensed.until + self._slottime_s - self._detect_s:
+        if start > sensed.until + self.slottime_s - self._detect_s:
             return None
         self.backoff = after(STEPS, self.backoff, Happens.BEGINS)
         return Slot.exact(start)
@@ -136,11 +136,11 @@ class Csma(BusyChannel):
     def _draw(self, idle_since: float, earliest: float, qos: Qos) -> float:
         waits, eagerness = WINDOWS[qos]
         first = next_on_grid(
-            idle_since + self._dwait_s + waits * self._slottime_s, self._slottime_s, earliest
+            idle_since + self._dwait_s + waits * self.slottime_s, self.slottime_s, earliest
         )
         chance = min(1.0, eagerness * self._persist)
         passed = 0
         if chance < 1:
             passed = int(math.log(1 - self._rng.random()) / math.log(1 - chance))
         self._backoffs += passed > 0
-        return first + passed * self._slottime_s
+        return first + passed * self.slottime_s

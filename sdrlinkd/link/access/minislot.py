@@ -65,7 +65,7 @@ class MiniSlots(BusyChannel):
         super().__init__()
         self._nodes = list(nodes)
         self._rank = self._nodes.index(own_id)
-        self.pause_s = self._minislot_s = minislot_s
+        self.pause_s = self.minislot_s = minislot_s
         self.round_s = SECTIONS * len(nodes) * minislot_s
         self._detect_s = detect_s
         self._last = (-1, NEVER, False)
@@ -80,7 +80,7 @@ class MiniSlots(BusyChannel):
     def state(self) -> str:
         """Policy, robots and times, for people."""
         text = (
-            f"minislot: {len(self._nodes)} robots, {self._minislot_s * 1e3:.3g} ms each, round in "
+            f"minislot: {len(self._nodes)} robots, {self.minislot_s * 1e3:.3g} ms each, round in "
             f"{self.round_s * 1e3:.3g} ms"
         )
         return f"{text}; last of all, as the last burst was not read" if self._is_last else text
@@ -93,12 +93,12 @@ class MiniSlots(BusyChannel):
     def mean_wait_s(self, qos: Qos) -> float:
         """Mean wait in s: all mini-slots of the higher level, and half of those of our level."""
         n = len(self._nodes)
-        return self._minislot_s * (1 + (n - 1) / 2 + (n if qos > Qos.LATENCY else 0))
+        return self.minislot_s * (1 + (n - 1) / 2 + (n if qos > Qos.LATENCY else 0))
 
     @property
     def turn_s(self) -> float:
         """Time in s from an idle channel to the first mini-slot of the lower level."""
-        return self._minislot_s * (1 + len(self._nodes))
+        return self.minislot_s * (1 + len(self._nodes))
 
     def carries(self, burst_s: float) -> float:
         """Share of airtime of bursts that start once the mini-slots of the higher level passed."""

@@ -65,9 +65,11 @@ class Tdma(BusyChannel):
         self._own_id = own_id
         self._nodes = list(nodes)
         self._rank = self._nodes.index(own_id)
-        self._slot_s = slot_s
-        self._guard_s = guard_s
-        self._minislot_s = minislot_s
+        self.slot_s = slot_s
+        self.guard_s = guard_s
+        """Time in s at the end of each slot in which nobody sends."""
+        self.minislot_s = minislot_s
+        """Time in s between the starts of two robots in a slot whose owner is silent."""
         self._reuse = reuse
         self._rng = rng
         self._look_s = look_s
@@ -108,8 +110,8 @@ class Tdma(BusyChannel):
             if self.role is State.FOLLOWER:
                 doing += f", {self._level} hops away"
         return (
-            f"tdma: {len(self._nodes)} slots of {self._slot_s * 1e3:.3g} ms, guard "
-            f"{self._guard_s * 1e3:.3g} ms; {doing}"
+            f"tdma: {len(self._nodes)} slots of {self.slot_s * 1e3:.3g} ms, guard "
+            f"{self.guard_s * 1e3:.3g} ms; {doing}"
         )
 
     @property
@@ -119,8 +121,8 @@ class Tdma(BusyChannel):
 
     def carries(self, burst_s: float) -> float:
         """Share of airtime of bursts, as slots lose guard times and gaps."""
-        open_s = self._slot_s - self._guard_s
-        return open_s / self._slot_s * burst_s / (burst_s + self._gap_s)
+        open_s = self.slot_s - self.guard_s
+        return open_s / self.slot_s * burst_s / (burst_s + self._gap_s)
 
     def slot(self, wish: Wish) -> Slot | None:
         """A time in our own slot, or in one that its owner does not use."""
@@ -132,10 +134,10 @@ class Tdma(BusyChannel):
             self._begin(earliest)
             self._followed_at = earliest
         self._forget(earliest)
-        number = math.floor((earliest - self._origin) / self._slot_s)
+        number = math.floor((earliest - self._origin) / self.slot_s)
         for each in (number, number + 1):
-            begin = self._origin + each * self._slot_s
-            end = begin + self._slot_s - self._guard_s
+            begin = self._origin + each * self.slot_s
+            end = begin + self.slot_s - self.guard_s
             turn = (self._rank - each) % len(self._nodes)
             if turn == 0 and self._listens_through(begin, earliest):
                 continue
@@ -144,7 +146,7 @@ class Tdma(BusyChannel):
                 if start >= earliest + self._look_s:
                     # Too early: decide at the last query before that start.
                     return None
-                pause = begin + PAUSE_AFTER * (self._slot_s - self._guard_s)
+                pause = begin + PAUSE_AFTER * (self.slot_s - self.guard_s)
                 planned_end = pause if start + need_s <= pause else end
                 if self._reuse:
                     # With reuse, others rely on a start at exactly this time.
@@ -265,7 +267,7 @@ class Tdma(BusyChannel):
         """Whether we only listen in our slot that starts at `begin`, to hear who sends in it."""
         if len(self._nodes) == 1 or not self._is_alone(now):
             return False
-        if abs(begin - self._listens[0]) > self._slot_s / 2:
+        if abs(begin - self._listens[0]) > self.slot_s / 2:
             self._listens = (begin, self._rng.random() < LISTEN_SHARE)
         return self._listens[1]
 
@@ -289,8 +291,8 @@ class Tdma(BusyChannel):
             return None
         n = len(self._nodes)
         if idle_since <= begin:
-            first = begin + turn * self._minislot_s
+            first = begin + turn * self.minislot_s
         else:
-            first = idle_since + (turn + 1) * self._minislot_s
-        start = next_on_grid(first, n * self._minislot_s, earliest)
-        return start if start <= sensed.until + self._minislot_s - self._detect_s else None
+            first = idle_since + (turn + 1) * self.minislot_s
+        start = next_on_grid(first, n * self.minislot_s, earliest)
+        return start if start <= sensed.until + self.minislot_s - self._detect_s else None

@@ -13,11 +13,11 @@ DELAY_S = 2e-6
 class Pair:
     """Two robots with different clocks; both CLOCKs of a period are exchanged."""
 
-    def __init__(self, offset_s=7.0, skew=2e-5, delay_s=DELAY_S, seed=SEED, **params):
+    def __init__(self, offset_s=7.0, skew=2e-5, delay_s=DELAY_S, seed=SEED, boot_id=0xB, **params):
         self.offset_s, self.skew, self.delay_s = offset_s, skew, delay_s
         self.rng = Random(seed)
         self.one = Clocks(ClockParams(**params), 0xA, 1)
-        self.two = Clocks(ClockParams(**params), 0xB, 2)
+        self.two = Clocks(ClockParams(**params), boot_id, 2)
         for clocks in (self.one, self.two):
             clocks.set_resolution(1e-6)
         self.at = 10.0

@@ -40,8 +40,7 @@ def test_a_clock_that_was_set_is_taken_for_bad_samples_until_the_filter_begins_a
 def test_another_boot_forgets_what_was_known():
     pair = Pair(filter="paper")
     pair.run(CONVERGES + 20)
-    pair.two = Pair(filter="paper", seed=9).two
-    pair.two._boot_id = 0xC
+    pair.two = Pair(filter="paper", seed=9, boot_id=0xC).two
     pair.run(3)
     assert pair.one.state(2, pair.at) is State.UNSYNCED
     assert pair.one.report(2, pair.at).resets == 1

@@ -42,7 +42,8 @@ class Network:
         self._n_nodes = n_nodes
         self._chance = Random(seed)
         both = {*links, *((b, a) for a, b in links)}
-        self._loss = {pair: (losses or {}).get(pair, loss) for pair in both}
+        self.loss = {pair: (losses or {}).get(pair, loss) for pair in both}
+        """Probability of loss by (sender, receiver); it may change."""
         self._near = {node: [b for a, b in sorted(both) if a == node] for node in range(n_nodes)}
         self._deliver, self._watch = deliver, watch
         self._events: list[tuple[float, int, Callable[[], None]]] = []
@@ -51,11 +52,15 @@ class Network:
         self._off: set[int] = set()
         self._armed = [inf] * n_nodes
         self.nodes = [self._new_node(node) for node in range(n_nodes)]
-        self.call(0.0, lambda: self._do(0, self.nodes[0].start(0.0)))
+        self.call(0.0, lambda: self.start(0))
 
     def call(self, at: float, what: Callable[[], None]) -> None:
         """Do something at a time in s."""
         heappush(self._events, (at, next(self._order), what))
+
+    def start(self, node: int) -> None:
+        """Let a node issue a token now."""
+        self._do(node, self.nodes[node].start(self.now))
 
     def send(self, message: Message) -> None:
         """Put a message into its node's queue at its time."""
@@ -97,7 +102,7 @@ class Network:
 
     def _quality(self, sender: int, receiver: int) -> float:
         """What stands for the signal's strength: the share of frames that come, in per cent."""
-        loss = self._loss.get((sender, receiver))
+        loss = self.loss.get((sender, receiver))
         return 0.0 if loss is None else max(1.0, 100.0 * (1.0 - loss))
 
     def _push(self, message: Message) -> None:
@@ -168,6 +173,6 @@ class Network:
         for other in self._on_air:
             if other is on_air or other.end <= on_air.begin or other.begin >= on_air.end:
                 continue
-            if other.frame.sender == at or (other.frame.sender, at) in self._loss:
+            if other.frame.sender == at or (other.frame.sender, at) in self.loss:
                 return False
-        return self._chance.random() >= self._loss[sender, at]
+        return self._chance.random() >= self.loss[sender, at]
