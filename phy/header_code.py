@@ -23,16 +23,16 @@ def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
 
 def parse_header(likeliest: NDArray[np.uint8], llr: NDArray[np.int16]) -> BurstHeader | None:
     """The header in `likeliest` `[4]`, or in another likely word of its LLRs `[76]`, or None."""
-    header = _checked(likeliest.tobytes())
+    header = checked(likeliest.tobytes())
     if header is not None:
         return header
     words = decode_list(llr, N_BITS // 8, N_CANDIDATES)
-    candidates = (_checked(octets.tobytes()) for octets in words)
+    candidates = (checked(octets.tobytes()) for octets in words)
     return next((header for header in candidates if header is not None), None)
 
 
 @lru_cache(maxsize=256)
-def _checked(data: bytes) -> BurstHeader | None:
+def checked(data: bytes) -> BurstHeader | None:
     """The header in four octets; None if its check fails or a field is invalid."""
     if crc8(data[:3]) != data[3]:
         return None

@@ -12,8 +12,9 @@ from phy.mcs import MCS_TABLE
 def warm_up(name: str = "auto", progress: engine.Progress | None = None) -> engine.Engine:
     """Choose the engine, build its library if there is none yet, and compute its tables.
 
-    The build takes a minute, once: `progress(done, total)` is called after each kernel, and an
-    exception from it ends the build. Raises `engine.EngineError` for an engine that cannot be used.
+    The build takes a minute, once: `progress(done, total)` is called first and after each kernel,
+    and an exception from it ends the build. Raises `engine.EngineError` for an engine that cannot
+    be used.
     """
     used = engine.use(name, progress)
     _compute_tables(used.name)

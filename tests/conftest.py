@@ -70,3 +70,10 @@ def start_daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[
     """Starts daemons and stops them in order; each must end cleanly, without a traceback."""
     with daemons(tmp_path_factory) as start:
         yield start
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """One daemon with the default settings, for all tests of a module that leave it as it is."""
+    with daemons(tmp_path_factory) as start:
+        yield start()

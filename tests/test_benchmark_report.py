@@ -182,8 +182,7 @@ def test_peers_of_pound_go_on_without_one(capsys):
     assert "not measured: udp, outage: no such tool\n" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(250)
+@pytest.mark.long
 def test_a_benchmark_goes_on_where_no_program_is_found():
     """The whole benchmark, without a compiler for liquid-dsp."""
     done = subprocess.run(

@@ -6,8 +6,7 @@ import sys
 import pytest
 import zmq
 
-from sdrlinkd.client import Publisher, endpoint
-from sdrlinkd.client.paths import OUT_SOCKET
+from sdrlinkd.client import OUT_SOCKET, Publisher, endpoint
 from sdrlinkd.descriptors import LEAST, Descriptors
 from tests.waiting import wait_for
 

@@ -5,7 +5,10 @@ import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
+
+import pytest
 
 import backends
 import phy
@@ -129,8 +132,59 @@ def test_no_test_names_what_is_private():
     assert found == []
 
 
-def test_tests_of_the_link_enter_by_a_door():
+DOORS_OF_PHY = {"engine", "kernels", "reference", "testing", "wifi"}
+
+
+@cache
+def used_by_tests():
+    """What each file of the tests imports, and what it replaces: (path, full name)."""
+    return [(path, name) for path in sources("tests") for name in imported(path)]
+
+
+def imported(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (each.name for each in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{each.name}" for each in node.names)
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "setattr":
+            yield ast.unparse(node.args[0]).removeprefix("f").strip("'")
+
+
+def doors():
+    """Packages that the product enters by their doors, and the names that each door has."""
+    rules = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    protected = {each for rule in rules["contracts"] for each in rule.get("protected_modules", ())}
+    packages = {each.removesuffix(".**") for each in protected if each.endswith(".**")}
+    for package in (*packages, *(f"phy.{each}" for each in DOORS_OF_PHY)):
+        path = ROOT / package.replace(".", "/")
+        text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+        listed = re.search(r"^__all__ = (\[.*?\])", text, re.MULTILINE | re.DOTALL)
+        more = DOORS_OF_PHY if package == "phy" else {"testing"}
+        yield package, {*ast.literal_eval(listed[1]), *more}
+
+
+def past(name, names):
+    """The package that `name` enters, but by its door (`names`); None: no package."""
+    parts = name.split(".")
+    for n in range(len(parts), 0, -1):
+        if (package := ".".join(parts[:n])) in names:
+            return package if parts[n:] and parts[n] not in names[package] else None
+    return None
+
+
+@pytest.mark.slow
+def test_tests_enter_by_doors():
     """So the inside of a package can change without them."""
-    inside = re.compile(r"^\s*(?:from|import) sdrlinkd\.link\.\w+\.\w+", re.MULTILINE)
-    past = [path for path in sources("tests", "benchmarks") if inside.search(path.read_text())]
-    assert past == []
+    names = dict(doors())
+    assert past("sdrlinkd.link.access.csma.after", names) == "sdrlinkd.link.access"
+    assert past("sdrlinkd.link.access.after", names) is None
+    assert past("phy.kernels.viterbi.decode_rows", names) == "phy.kernels"
+    assert [use for use in used_by_tests() if past(use[1], names)] == []
+
+
+@pytest.mark.slow
+def test_tests_import_from_no_other_test():
+    """What several of them need is in a module of its own."""
+    ours = [use for use in used_by_tests() if use[1].startswith("tests.")]
+    assert [use for use in ours if ".test_" in use[1]] == []

@@ -10,8 +10,8 @@ import zmq
 
 from sdrlinkd.adapters import MessageTypes
 from sdrlinkd.bus import Bus, RuntimeDirectory
-from sdrlinkd.client.messages import decode_in, new_late_topic
-from sdrlinkd.client.paths import OUT_SOCKET, endpoint
+from sdrlinkd.client import OUT_SOCKET, endpoint
+from sdrlinkd.client.testing import decode_in, new_late_topic
 from sdrlinkd.config import Config, make_setup
 from sdrlinkd.link import AccessParams, Link, PduLinkTraits, RateParams
 from sdrlinkd.node import Node

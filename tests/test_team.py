@@ -11,7 +11,7 @@ from tests.laws import trials
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to_all", [False, True])
+@pytest.mark.parametrize("to_all", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_a_route_heals_in_time_and_nothing_is_lost(to_all):
     for seed in range(101, 101 + trials(3)):
         found = heal(seed, to_all=to_all)
@@ -31,7 +31,7 @@ def test_the_papers_chain_with_its_joystick_loses_nothing():
         assert joystick_s < 0.008
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_chain_of_five_carries_half_of_that_and_asks_for_nothing_that_only_waits():
     for seed in range(11, 11 + trials(1)):
         found = carry("grant", seed, 6.0, n=5, load=0.5)
@@ -39,7 +39,7 @@ def test_a_chain_of_five_carries_half_of_that_and_asks_for_nothing_that_only_wai
         assert found.asked < 0.05 * found.pdus
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_images_survive_four_hops_that_lose_pdus():
     """At 6.8 dB, each hop loses something of nearly every image."""
     found = carry("grant", 5, 6.0, n=5, load=0.5, snr_db=6.8)
@@ -51,7 +51,7 @@ def test_images_survive_four_hops_that_lose_pdus():
     assert image >= 0.9
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_robots_that_drive_lose_next_to_nothing_while_there_is_a_path():
     """A few are lost where a team falls in two, or comes together: see docs/limits.md."""
     found = drive("grant", 1, 30.0)
@@ -61,7 +61,7 @@ def test_robots_that_drive_lose_next_to_nothing_while_there_is_a_path():
         assert found.mdr(qos) >= least
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_something_urgent_waits_for_a_round_where_radios_turn_round_slowly():
     # A message that is begun at the end of a turn may go on too late for its receivers.
     for size, most, least in ((64, 1.2, 1.0), (2048, 2.3, 0.8)):
@@ -72,7 +72,7 @@ def test_something_urgent_waits_for_a_round_where_radios_turn_round_slowly():
         assert found.forwarded < 100
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("policy", ["tdma", "grant"])
 def test_a_relay_asks_for_what_it_lacks(policy):
     """At 6.4 dB, some PDUs in a hundred are lost on each hop."""

@@ -80,7 +80,7 @@ def test_after_an_interrupt_none_is_left():
     assert multiprocessing.active_children() == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_rows_are_the_same_however_many_processes_there_are(monkeypatch):
     monkeypatch.setattr(turnaround_rows, "QUICK_S", 3.0)
     found = []
@@ -93,7 +93,7 @@ def test_rows_are_the_same_however_many_processes_there_are(monkeypatch):
         assert found[0] != [*turnaround_rows.rows(runs, 6, True)], "the seed counts"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_benchmark_can_be_interrupted():
     command = [sys.executable, "-m", "benchmarks.team", "--quick", "--json", "--processes", "2"]
     with subprocess.Popen(

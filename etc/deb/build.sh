@@ -35,10 +35,9 @@ environment() {
     pip="$tools -m pip --quiet --disable-pip-version-check"
     $pip install -c constraints.txt hatchling
     "$tools" -m hatchling build -t wheel -d "$build/wheels"
-    (cd etc/client && "$tools" -m hatchling build -t wheel -d "$build/wheels")
     "$python" -m venv --without-pip "$env"
     $pip --python "$env/bin/python3" install --no-compile --no-warn-script-location -c constraints.txt \
-        "$build"/wheels/sdrlinkd_client-*.whl "$(echo "$build"/wheels/sdrlinkd-*.whl)[plots,metrics,zenoh,web,foxglove]"
+        "$(echo "$build"/wheels/sdrlinkd-*.whl)[plots,metrics,zenoh,web,foxglove]"
     site=$(echo "$env"/lib/python3.*/site-packages)
     # The modem for any machine of this architecture; a library for this one alone is of no use elsewhere.
     rm -rf "$site/phy/engine/libraries"

@@ -3,6 +3,7 @@
 import contextlib
 import importlib.util
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -37,17 +38,20 @@ class BuildError(Exception):
 def build(target: Target, to: Path, progress: Progress | None = None) -> None:
     """Compile the kernels for `target` into the library `to`, in another process.
 
-    `progress(done, total)` is called after each kernel, and an exception from it ends the build.
-    Raises BuildError.
+    `progress(done, total)` is called first and after each kernel, and an exception from it ends the
+    build. Raises BuildError.
     """
     if importlib.util.find_spec("numba") is None:
-        raise BuildError("numba is not installed: `pip install numba`")
+        raise BuildError(f"numba is not installed: {_line('numba')}")
     compiler = _c_compiler(target)
     if compiler is None:
-        raise BuildError("there is no C compiler: install gcc, or `pip install ziglang`")
+        raise BuildError(f"there is no C compiler: install gcc, or {_line('ziglang')}")
+    if progress is not None:
+        # The first kernel takes seconds.
+        progress(0, N_STEPS)
     with tempfile.TemporaryDirectory(prefix="sdrlinkd-build-") as folder:
         made, linked = Path(folder) / "kernels.o", Path(folder) / "kernels.so"
-        _compile(target, made, progress)
+        compile_kernels(target, made, progress)
         made.with_name("kernels.h").write_text(library.header())
         sources = [f"-I{folder}", str(_CALLS), str(made)]
         _link([*compiler, *_OPTIONS, *sources, "-o", str(linked), "-lm"])
@@ -56,7 +60,13 @@ def build(target: Target, to: Path, progress: Progress | None = None) -> None:
         progress(N_STEPS, N_STEPS)
 
 
-def _compile(target: Target, to: Path, progress: Progress | None) -> None:
+def _line(package: str) -> str:
+    """The line that installs a package into the environment of this program."""
+    return f"`{shlex.quote(sys.executable)} -m pip install {package}`"
+
+
+def compile_kernels(target: Target, to: Path, progress: Progress | None = None) -> None:
+    """Compile the kernels for `target` into the object file `to`. Raises BuildError."""
     settings = {**os.environ, **_SETTINGS, "NUMBA_CACHE_DIR": str(to.parent)}
     settings["PYTHONPATH"] = os.pathsep.join((str(_ROOT), os.environ.get("PYTHONPATH", "")))
     command = [sys.executable, "-m", "phy.engine", target.name, str(to)]

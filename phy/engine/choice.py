@@ -38,7 +38,7 @@ def use(name: str = "auto", progress: Progress | None = None) -> Engine:
     """Use an engine of ENGINES from now on; "auto": the compiled one if possible.
 
     A library that is missing is built first, which takes a minute: `progress(done, total)` is
-    called after each kernel, and an exception from it ends the build. Raises EngineError.
+    called first and after each kernel, and an exception from it ends the build. Raises EngineError.
     """
     global _in_use
     if name not in ENGINES:

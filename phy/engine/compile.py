@@ -6,7 +6,6 @@ memory copies belongs to numba's handling of errors: no kernel may fail, so thos
 process.
 """
 
-import importlib
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba import cfunc, types
 
+from phy import kernels
 from phy.engine import files
 from phy.engine.entries import ENTRIES, Entry
 from phy.engine.targets import Target
@@ -62,9 +62,8 @@ def write_object(target: Target, to: Path, progress: Callable[[int], None]) -> N
 
 def _compile(name: str, entry: Entry) -> tuple[str, str]:
     """(a kernel in LLVM's language, the name of its function there)."""
-    kernel = getattr(importlib.import_module(f"phy.kernels.{entry.module}"), name)
     words: Any = types.CPointer(types.int64)  # type: ignore[no-untyped-call]
-    compiled = cfunc(types.void(words, words))(call_of(kernel, entry))
+    compiled = cfunc(types.void(words, words))(call_of(getattr(kernels, name), entry))
     return compiled.inspect_llvm(), compiled.native_name
 
 

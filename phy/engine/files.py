@@ -14,7 +14,7 @@ from phy.engine.targets import FAMILIES, Target, this
 SYMBOL = "phy_"
 """A library's functions are the kernels' names after this."""
 _PHY = Path(__file__).parents[1]
-_BESIDE = _PHY / "engine" / "libraries"
+BESIDE = _PHY / "engine" / "libraries"
 _PREFIX, _SUFFIX = "kernels-", ".so"
 
 
@@ -23,7 +23,7 @@ def place(target: Target) -> Path:
 
     Raises OSError if nothing can be written.
     """
-    for folder in _folders():
+    for folder in folders():
         with contextlib.suppress(OSError):
             folder.mkdir(mode=0o755, parents=True, exist_ok=True)
             if os.access(folder, os.W_OK) and _is_trusted(folder):
@@ -35,7 +35,7 @@ def place(target: Target) -> Path:
 def fitting() -> Path | None:
     """The best library of this source that this machine can run, if there is one."""
     for target in (this(), *(each for each in FAMILIES if each.fits)):
-        for folder in _folders():
+        for folder in folders():
             found = folder / name_of(target)
             if _is_trusted(folder) and _is_trusted(found):
                 return found
@@ -65,9 +65,9 @@ def source_key() -> str:
     return key.hexdigest()[:16]
 
 
-def _folders() -> Iterator[Path]:
+def folders() -> Iterator[Path]:
     """Beside the source, the user's cache, and a temporary folder that later processes find."""
-    yield _BESIDE
+    yield BESIDE
     given = os.environ.get("XDG_CACHE_HOME")
     with contextlib.suppress(RuntimeError):
         yield (Path(given) if given else Path("~/.cache").expanduser()) / "sdrlinkd"
@@ -85,6 +85,6 @@ def _is_trusted(path: Path) -> bool:
         owners = {0, os.geteuid(), Path(__file__).stat().st_uid}
     except OSError:
         return False
-    if _BESIDE in (path, path.parent):
+    if BESIDE in (path, path.parent):
         return True
     return found.st_uid in owners and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

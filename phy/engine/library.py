@@ -36,7 +36,7 @@ def load(path: Path) -> dict[str, Kernel]:
     for each in (functions, address_of):
         each.restype = ctypes.py_object
     address_of.argtypes, functions.argtypes = [ctypes.py_object], [ctypes.py_object] * 2
-    if address_of(probe) != _content_of(probe):
+    if address_of(probe) != content_of(probe):
         raise OSError("this NumPy keeps its arrays in another form")
     return dict(zip(ENTRIES, functions(np.ndarray, tuple(_DTYPES)), strict=True))
 
@@ -59,5 +59,6 @@ def _type(field: Field) -> str:
     return _NUMBERS[field.dtype.kind]
 
 
-def _content_of(array: NDArray[np.float64]) -> int:
+def content_of(array: NDArray[np.float64]) -> int:
+    """The address of an array's content, as NumPy tells it."""
     return array.ctypes.data

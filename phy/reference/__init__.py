@@ -12,8 +12,44 @@ The modules in the order of the signal, sending: `header`, `viterbi` (its code),
 and delay, resampling, and the sense of a busy channel.
 """
 
+from phy.reference import (
+    acquisition,
+    channel,
+    demapper,
+    detection,
+    equaliser,
+    header,
+    ldpc,
+    mapping,
+    ofdm,
+    offset,
+    smoothing,
+    timing,
+    tracking,
+    training,
+    viterbi,
+)
 from phy.reference.kernels import KERNELS
 from phy.reference.receiver import Receiver
 from phy.reference.transmitter import Transmitter
 
-__all__ = ["KERNELS", "Receiver", "Transmitter"]
+__all__ = [
+    "KERNELS",
+    "Receiver",
+    "Transmitter",
+    "acquisition",
+    "channel",
+    "demapper",
+    "detection",
+    "equaliser",
+    "header",
+    "ldpc",
+    "mapping",
+    "ofdm",
+    "offset",
+    "smoothing",
+    "timing",
+    "tracking",
+    "training",
+    "viterbi",
+]

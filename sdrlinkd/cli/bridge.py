@@ -11,10 +11,9 @@ import uvloop
 from sdrlinkd.cli.app import RuntimeDir, app
 from sdrlinkd.cli.completion import heard_names
 from sdrlinkd.cli.listening import host_and_port
-from sdrlinkd.errors import UserError
+from sdrlinkd.extras import needs
 from sdrlinkd.journal import log_to_stderr
 
-NO_SDK = "the bridge needs Foxglove's SDK: pip install 'sdrlinkd[foxglove]'"
 LISTEN = "127.0.0.1:8765"
 
 bridges = typer.Typer(
@@ -51,12 +50,8 @@ def foxglove(
     runtime_dir: RuntimeDir = None,
 ) -> None:
     """Serve received topics, the link's state and robots' places to Foxglove until Ctrl-C."""
-    try:
+    with needs("foxglove"):
         from sdrlinkd.foxglove import run_bridge
-    except ModuleNotFoundError as error:
-        if error.name != "foxglove":
-            raise
-        raise UserError(NO_SDK) from None
     host, port = host_and_port(listen, "--listen", LISTEN)
     patterns = publish or []
 

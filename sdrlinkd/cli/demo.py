@@ -33,7 +33,8 @@ from sdrlinkd.demo import (
     topic_table,
     verdict,
 )
-from sdrlinkd.drive import RunDrive
+from sdrlinkd.drive import DRIVE, RunDrive
+from sdrlinkd.extras import lacking
 from sdrlinkd.reports import Snapshot
 from sdrlinkd.tables import screen_console
 from sdrlinkd.wire import MAX_PDU_SIZE, MIN_PDU_SIZE
@@ -134,8 +135,8 @@ def demo(
 ) -> None:
     """Send a robot's messages through daemons and radios; repeat the paper's measurements."""
     console = screen_console()
-    pictures = load_pictures("sdrlinkd.demo")
-    make_folder(out, PICTURES)
+    no_pictures = lacking("plots")
+    make_folder(out, [] if no_pictures else PICTURES)
     results: list[RunResult] = []
     traces: dict[str, Trace] = {}
     kinds = list(dict.fromkeys(link or list(LinkKind)))
@@ -163,23 +164,35 @@ def demo(
     for path in (out / REPORT, json_file):
         if path is not None:
             write_report(path, told)
-    caption = _caption(results[0])
-    pictures.latency_cdf(traces, out / PICTURES[0], caption)
-    pictures.paths(traces, out / PICTURES[1], caption)
+    made = [REPORT, *(f"{kind.value}/{DRIVE}" for kind in kinds)]
+    if not no_pictures:
+        made = [REPORT, *PICTURES, *(f"{kind.value}/{PAGE}" for kind in kinds)]
+        _draw(results, traces, out)
     for result in results if len(results) == 1 else ():
         console.print(topic_table(result))
     console.print(table_6(results))
     for result in results:
         _say(console, _summary(result))
-    drives = ", ".join(f"{kind.value}/{PAGE}" for kind in kinds)
-    _say(console, f"wrote {out}/{REPORT}, {', '.join(PICTURES)}, {drives}")
+    _say(console, f"wrote {out}/{', '.join(made)}")
     if results[0].damage:
         _say(console, f"warning: {results[0].damage}", style="yellow")
     for result in results:
         if text := verdict(result):
             _say(console, text, style="yellow" if is_good(result) else "bold red")
+    if no_pictures:
+        _say(console, no_pictures)
     if not all(map(is_good, results)):
         raise typer.Exit(1)
+
+
+def _draw(results: list[RunResult], traces: dict[str, Trace], out: Path) -> None:
+    """Draw the pictures of all links, and the page of each."""
+    pictures = load_pictures("sdrlinkd.demo")
+    caption = _caption(results[0])
+    pictures.latency_cdf(traces, out / PICTURES[0], caption)
+    pictures.paths(traces, out / PICTURES[1], caption)
+    for link, result in zip(traces, results, strict=True):
+        write_page(out / link, f"Demo over {link}: {result.source}")
 
 
 def _measure(console: Console, source: Source, options: Options) -> float:
@@ -212,7 +225,6 @@ def _run(
     with closing(drive):
         result, trace = _in_sight(console, source, options, see)
         drive.passed(NODE_ID, receiver, trace, began)
-    write_page(folder, f"Demo over {options.link}: {source.title}")
     return result, trace
 
 

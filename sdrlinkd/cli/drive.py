@@ -12,9 +12,9 @@ from sdrlinkd.cli.app import RuntimeDirs, app
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.drive import DriveWriter, keep, read_drive
 from sdrlinkd.errors import UserError, ungrouped
+from sdrlinkd.extras import needs
 from sdrlinkd.tables import screen_console
 
-NO_PLOTS = "the report needs matplotlib and Jinja2: pip install 'sdrlinkd[plots]'"
 NO_DAEMON = (
     "log: no daemon of this host is running; start one, or name its directory with --runtime-dir"
 )
@@ -74,12 +74,8 @@ def report(
 
 def write_page(drive: Path, title: str, path: Path | None = None) -> None:
     """Write the page of a drive, by default beside it. Raises UserError."""
-    try:
+    with needs("plots"):
         from sdrlinkd.drive import report_page
-    except ModuleNotFoundError as error:
-        if error.name not in ("matplotlib", "jinja2"):
-            raise
-        raise UserError(NO_PLOTS) from None
     found = read_drive(drive)
     path = path or found.path.parent / PAGE
     try:

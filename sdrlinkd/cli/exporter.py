@@ -9,8 +9,7 @@ from sdrlinkd.cli.app import RuntimeDirs, app
 from sdrlinkd.cli.listening import host_and_port
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.errors import UserError
-
-NO_CLIENT = "the exporter needs prometheus-client: pip install 'sdrlinkd[metrics]'"
+from sdrlinkd.extras import needs
 
 
 @app.command("exporter")
@@ -21,14 +20,10 @@ def exporter(
     ] = "127.0.0.1:9477",
 ) -> None:  # fmt: skip
     """Serve the figures of this host's daemons to Prometheus until Ctrl-C."""
-    try:
+    with needs("metrics"):
         from prometheus_client import CollectorRegistry, start_http_server
 
         from sdrlinkd.exporter import Collector
-    except ModuleNotFoundError as error:
-        if error.name != "prometheus_client":
-            raise
-        raise UserError(NO_CLIENT) from None
     host, port = host_and_port(listen, "--listen", "127.0.0.1:9477")
     registry = CollectorRegistry()
     registry.register(Collector((lambda: runtime_dir) if runtime_dir else directories))

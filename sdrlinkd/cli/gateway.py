@@ -13,11 +13,10 @@ import uvloop
 from sdrlinkd import __version__
 from sdrlinkd.cli.programs import run_program
 from sdrlinkd.config import load_config, make_setup
-from sdrlinkd.errors import UserError
+from sdrlinkd.extras import needs
 from sdrlinkd.journal import log_to_stderr
 
 DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
-NO_ZENOH = "the gateway needs Zenoh: pip install 'sdrlinkd[zenoh]'"
 
 app = typer.Typer(name="sdrlink-gateway", pretty_exceptions_enable=False, add_completion=True)
 
@@ -37,12 +36,8 @@ def gateway(
         typer.echo(f"sdrlink-gateway {__version__}")
         return
     setup = make_setup(load_config(config), config.parent, str(config))
-    try:
+    with needs("zenoh"):
         from sdrlinkd.fleet import make_zenoh_config, run_gateway
-    except ModuleNotFoundError as error:
-        if error.name != "zenoh":
-            raise
-        raise UserError(NO_ZENOH) from None
     if check:
         make_zenoh_config(setup.config.fleet, config.parent)
         typer.echo("the configuration is valid")

@@ -18,6 +18,7 @@ from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
 from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario, scenario_names
 from sdrlinkd.cli.page_beside import page_beside
 from sdrlinkd.drive import DRIVE, RunDrive
+from sdrlinkd.extras import lacking
 from sdrlinkd.lab import (
     LabOptions,
     LabReport,
@@ -86,8 +87,8 @@ def lab(
         chosen = msgspec.structs.replace(chosen, daemon={**chosen.daemon, "access": section})
     if bag is None and chosen.bag:
         bag = scenario.parent / chosen.bag
-    pictures = load_pictures("sdrlinkd.lab")
-    make_folder(out, [PICTURE])
+    no_pictures = lacking("plots")
+    make_folder(out, [] if no_pictures else [PICTURE])
     options = LabOptions(scenario, chosen, bag, traces)
     title = chosen.title or scenario.stem
     compile_first(console)
@@ -122,13 +123,17 @@ def lab(
         report = run_lab(options, watch, kept.passed)
     write_report(out / REPORT, report)
     wall_s = time.monotonic() - began
-    pictures.draw(report, chosen, out / PICTURE, _caption(report, scenario))
     console.print(pair_table(report))
     for line in _summary(report, wall_s):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    write_page(out, title)
-    wrote = f"wrote {out}/{REPORT}, {PICTURE}, {DRIVE}, {PAGE}"
-    console.print(wrote, highlight=False, markup=False, soft_wrap=True)
+    made = [REPORT, DRIVE]
+    if not no_pictures:
+        made = [REPORT, PICTURE, DRIVE, PAGE]
+        pictures = load_pictures("sdrlinkd.lab")
+        pictures.draw(report, chosen, out / PICTURE, _caption(report, scenario))
+        write_page(out, title)
+    for line in filter(None, (f"wrote {out}/{', '.join(made)}", no_pictures)):
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
     if not all(robot.ledger_adds_up for robot in report.robots):
         raise typer.Exit(1)
 

@@ -8,18 +8,18 @@ from types import ModuleType
 import msgspec
 
 from sdrlinkd.errors import UserError
+from sdrlinkd.extras import needs
 
 REPORT = "report.json"
 
 
 def load_pictures(package: str) -> ModuleType:
-    """The module `package`.pictures, imported late as matplotlib is slow to load and optional."""
-    try:
+    """The module `package`.pictures, imported late as matplotlib is slow to load and optional.
+
+    Raises UserError.
+    """
+    with needs("plots"):
         return import_module(f"{package}.pictures")
-    except ImportError:
-        raise UserError(
-            "the plots need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
-        ) from None
 
 
 def make_folder(out: Path, pictures: Sequence[str]) -> None:

@@ -14,8 +14,8 @@ from sdrlinkd.cli.listening import host_and_port
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.config import ENDPOINT, FLEET_NAME, FleetParams
 from sdrlinkd.errors import UserError
+from sdrlinkd.extras import needs
 
-NO_NICEGUI = "the page needs NiceGUI: pip install 'sdrlinkd[web]'"
 TOKEN = "SDRLINK_WEB_TOKEN"  # noqa: S105 (the name of a variable)
 
 
@@ -66,7 +66,7 @@ def web(
     ] = None,
 ) -> None:  # fmt: skip
     """Serve a page with map, link and topics until Ctrl-C."""
-    try:
+    with needs("web"):
         from sdrlinkd.web import (
             Options,
             World,
@@ -76,10 +76,6 @@ def web(
             read_floor_plan,
             serve,
         )
-    except ModuleNotFoundError as error:
-        if error.name not in ("nicegui", "PIL", "zenoh"):
-            raise
-        raise UserError(NO_NICEGUI) from None
     host, port = host_and_port(listen, "--listen", "127.0.0.1:8420")
     options = Options(
         host, port, (os.environ.get(TOKEN) or new_token()) if token else "", control,

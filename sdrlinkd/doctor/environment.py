@@ -7,6 +7,7 @@ from importlib import metadata
 from pathlib import Path
 
 from sdrlinkd.doctor.finding import Finding, bad, good, good_if
+from sdrlinkd.extras import install_line
 
 LEAST_PYTHON = (3, 11)
 _REQUIREMENT = re.compile(r"([A-Za-z0-9_.\-]+)\s*(?:>=\s*([0-9.]+))?[^;]*(;.*)?")
@@ -44,7 +45,7 @@ def check_environment(
 
 
 def _packages(requirements: list[str], version_of: Callable[[str], str]) -> Finding:
-    wrong, count = [], 0
+    wrong, needed, count = [], [], 0
     for text in requirements:
         name, least, marker = _REQUIREMENT.fullmatch(text.strip()).groups()  # type: ignore[union-attr]
         if marker:
@@ -54,11 +55,13 @@ def _packages(requirements: list[str], version_of: Callable[[str], str]) -> Find
             version = version_of(name)
         except metadata.PackageNotFoundError:
             wrong.append(f"{name} is missing")
-            continue
-        if least and _numbers(version) < _numbers(least):
+        else:
+            if not least or _numbers(version) >= _numbers(least):
+                continue
             wrong.append(f"{name} {version} is older than {least}")
+        needed.append(text)
     if wrong:
-        return bad("packages", ", ".join(wrong), "reinstall sdrlinkd: pip install ./etc/client .")
+        return bad("packages", ", ".join(wrong), f"install them: {install_line(*needed)}")
     return good("packages", f"{count}, all installed")
 
 

@@ -25,6 +25,7 @@ def read(path):
     return messages
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_drive_of_ros2_is_read_whole(tmp_path, storage):
     written = ros2_drive(tmp_path / "drive", STORAGES[storage], DURATION_S)

@@ -4,8 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from sdrlinkd.adapters import BuiltInRobot, Due, due_messages
-from sdrlinkd.adapters.bags import BagMessage
+from sdrlinkd.adapters import BagMessage, BuiltInRobot, Due, due_messages
 
 IDS = {"/a": 4, "/b": 0}
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from sdrlinkd.adapters import first_seconds, paced
-from sdrlinkd.adapters.bags import BagMessage
+from sdrlinkd.adapters import BagMessage, first_seconds, paced
 
 
 class FakeTime:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sdrlinkd.adapters import BuiltInRobot, from_cdr
-from sdrlinkd.adapters.robot import ROOM_HALF_M, Pose
+from sdrlinkd.adapters.testing import ROOM_HALF_M, Pose
 
 
 @pytest.fixture(scope="module")

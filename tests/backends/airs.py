@@ -3,7 +3,7 @@
 import numpy as np
 
 from backends import AirParams, RadioParams, TxBurst, World
-from backends.ether import Medium
+from backends.testing import Medium
 from tests.backends.radios import noise
 
 RATE = 1e6

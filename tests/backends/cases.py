@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from backends import IqFileRadio, LoopbackRadio, Radio, RadioParams, SoapyRadio, SoapySettings
-from backends.ether.medium import NOISE_DBFS
+from backends.testing import NOISE_DBFS
 from tests.backends.echo import ZmqEcho
 from tests.backends.hubs import SNR_DB, RadioOnHub, free_hub_port
 from tests.backends.radios import AIR, BLOCK_S, PLAYED, N, heard, read, record

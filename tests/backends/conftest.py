@@ -4,6 +4,7 @@ import os
 
 import pytest
 
+from backends.testing import CONSTANTS
 from phy import warm_up
 from tests.soapy_loopback import missing, module_folder
 
@@ -45,10 +46,10 @@ def own_rights(tmp_path, monkeypatch):
 def at_ease(monkeypatch):
     """Radios that make no gaps on a slow machine; radios and hubs that end quickly."""
     # Gaps have separate tests.
-    monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", 1e6)
+    monkeypatch.setattr(*CONSTANTS["loopback_max_behind_s"], 1e6)
     # Interval at which a waiting thread checks whether it should stop.
-    monkeypatch.setattr("backends.ether.hub.LOOK_AFTER_MS", 20)
-    monkeypatch.setattr("backends.ether.real_time.ASK_S", 0.02)
-    monkeypatch.setattr("backends.ether.presence.ASK_S", 0.02)
-    monkeypatch.setattr("backends.ether.presence.QUIET_S", 0.2)
-    monkeypatch.setattr("backends.ether.real_time.MAX_BEHIND_S", 1e6)
+    monkeypatch.setattr(*CONSTANTS["hub_look_after_ms"], 20)
+    monkeypatch.setattr(*CONSTANTS["real_time_ask_s"], 0.02)
+    monkeypatch.setattr(*CONSTANTS["presence_ask_s"], 0.02)
+    monkeypatch.setattr(*CONSTANTS["presence_quiet_s"], 0.2)
+    monkeypatch.setattr(*CONSTANTS["real_time_max_behind_s"], 1e6)

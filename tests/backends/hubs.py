@@ -20,8 +20,7 @@ from backends import (
     hub_at,
     hub_in,
 )
-from backends.ether import protocol
-from backends.hub_address import AIR, SKY
+from backends.testing import AIR, SKY, protocol
 from tests.backends.radios import BLOCK_S, RATE, TUNING, opened, record
 from tests.waiting import wait_for
 

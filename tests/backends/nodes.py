@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 
 from backends import LocalEther, Tuning, TxBurst, World
-from backends.ether.medium import NOISE_DBFS
+from backends.testing import NOISE_DBFS
 from tests.backends.airs import CENTRE_HZ, RATE, SEED, air
 
 BLOCK_S = 0.001

@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import BackendError, Channel
-from backends.air import Timeline
-from backends.pace import Pace
+from backends.testing import Pace, Timeline
 from phy import PROFILES, FrontEndParams, PathParams
 from tests.backends.radios import AIR, RATE, noise
 from tests.laws import law
@@ -176,8 +175,7 @@ def test_an_unknown_profile_is_named_with_those_that_exist():
 def clock(monkeypatch):
     """Pace's clock, which stands still until it is set."""
     clock = SimpleNamespace(ns=10**12)
-    clock.monotonic_ns = lambda: clock.ns
-    monkeypatch.setattr("backends.pace.time", clock)
+    monkeypatch.setattr(time, "monotonic_ns", lambda: clock.ns)
     return clock
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import SAMPLE_TYPES, BackendError, RecordingReader, RecordingWriter, describe
-from backends.recording import RAW_TYPES
+from backends.testing import RAW_TYPES
 from tests.backends.radios import RATE, noise, read, record
 from tests.laws import law
 

@@ -6,9 +6,8 @@ import itertools
 import numpy as np
 import pytest
 
-from backends import BackendError, TxBurst, TxOutcome
-from backends.feed import MAX_WAITING
-from backends.outstanding import GAP
+from backends import GAP, BackendError, TxBurst, TxOutcome
+from backends.testing import MAX_WAITING
 from tests.backends.cases import (
     assert_only,
     every_radio,

@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from backends import TxBurst, TxOutcome
-from backends.feed import MAX_WAITING, BlockFeed
+from backends.testing import MAX_WAITING, BlockFeed
 from tests.backends.cases import assert_only, every_radio, not_in_lockstep, transmitters
 from tests.backends.radios import N, hand_over, noise, opened, take, turn
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from backends import (
+    GAP,
     BackendError,
     EtherHub,
     EtherRadio,
@@ -19,9 +20,7 @@ from backends import (
     World,
     hub_in,
 )
-from backends.ether import protocol
-from backends.hub_address import AIR, SKY
-from backends.outstanding import GAP
+from backends.testing import AIR, CONSTANTS, SKY, protocol
 from tests.backends.hubs import RawRadio, ask, hub_air, serving, until
 from tests.backends.radios import (
     RATE,
@@ -162,7 +161,7 @@ async def test_an_id_is_free_when_its_robot_is_gone(tmp_path):
 
 @pytest.mark.parametrize("exists", [True, False])
 async def test_without_a_hub_a_radio_says_how_to_start_one(tmp_path, monkeypatch, exists):
-    monkeypatch.setattr("backends.ether.radio.ANSWER_MS", 50)
+    monkeypatch.setattr(*CONSTANTS["hub_answer_ms"], 50)
     folder = tmp_path if exists else tmp_path / "none"
     reason = await refusal(folder)
     assert reason.startswith(f"{folder}: no hub answers there; start one: ")

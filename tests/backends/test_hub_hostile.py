@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from backends import EtherRadio, RadioParams, TxBurst, TxOutcome, hub_in
-from backends.ether import protocol
+from backends.testing import protocol
 from tests.backends.hubs import RawRadio, ask, serving, until
 from tests.backends.radios import RATE, TUNING, N, noise, opened, send, take
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from backends import BackendError, EtherRadio, HubWatch, RadioParams, TxBurst, TxOutcome, hub_in
-from backends.ether import protocol
+from backends.testing import CONSTANTS, protocol
 from tests.backends.hubs import RawRadio, ask, serving, until
 from tests.backends.radios import BLOCK_S, N, noise, opened, send, take, turn
 
@@ -150,7 +150,7 @@ async def test_who_comes_when_it_has_begun_is_refused(tmp_path):
 @pytest.mark.parametrize("watched", [False, True])
 async def test_a_radio_that_vanishes_does_not_stop_the_others(tmp_path, monkeypatch, watched):
     """It sends no Bye and leaves its step unfinished, possibly while other messages wait."""
-    monkeypatch.setattr("backends.ether.hub.LOOK_AFTER_MS", 200)
+    monkeypatch.setattr(*CONSTANTS["hub_look_after_ms"], 200)
     with lockstep(tmp_path, THREE), HubWatch(tmp_path) as watch, RawRadio(tmp_path) as raw:
         token = raw.join(3)
         is_over = threading.Event()
@@ -186,7 +186,7 @@ async def test_a_radio_that_vanishes_does_not_stop_the_others(tmp_path, monkeypa
 
 async def test_a_radio_that_leaves_does_not_stop_the_others(tmp_path, monkeypatch):
     """It may also leave before the air has begun; the hub does not have to wait for a timeout."""
-    monkeypatch.setattr("backends.ether.hub.LOOK_AFTER_MS", 60_000)
+    monkeypatch.setattr(*CONSTANTS["hub_look_after_ms"], 60_000)
     with lockstep(tmp_path, THREE):
         async with opened(EtherRadio(hub_in(tmp_path), 3, "")):
             pass

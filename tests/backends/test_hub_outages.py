@@ -19,12 +19,15 @@ from backends import (
     TxOutcome,
     hub_in,
 )
-from backends.ether import protocol
-from backends.ether.presence import Presence
-from backends.ether.real_time import BEHIND_S
-from backends.ether.sockets import HubSockets
-from backends.feed import MAX_WAITING
-from backends.hub_address import AIR
+from backends.testing import (
+    AIR,
+    BEHIND_S,
+    CONSTANTS,
+    MAX_WAITING,
+    HubSockets,
+    Presence,
+    protocol,
+)
 from tests.backends.hubs import Listener, ask, serving, until
 from tests.backends.radios import BLOCK_S, RATE, TUNING, N, noise, opened, send, take
 
@@ -119,7 +122,7 @@ async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave
         await until(lambda: radio.counters["hub_outages"] == 1)
         lost.append(radio.send(TxBurst(0, noise(10))))
         # The second hub stays, however slow the machine is.
-        monkeypatch.setattr("backends.ether.presence.QUIET_S", 10.0)
+        monkeypatch.setattr(*CONSTANTS["presence_quiet_s"], 10.0)
         with serving(tmp_path, {1: params}):
             assert {(await each).outcome for each in lost} == {TxOutcome.LOST}
             assert ask(tmp_path).bursts == 0, "what was sent in vain stays where it is"
@@ -177,7 +180,7 @@ async def test_a_hub_that_was_silent_but_knows_its_radios_is_not_joined_again(
 
 @pytest.mark.slow
 async def test_a_radio_that_does_not_read_misses_samples_and_hinders_nobody(tmp_path, monkeypatch):
-    monkeypatch.setattr("backends.ether.real_time.MAX_BEHIND_S", 0.05)
+    monkeypatch.setattr(*CONSTANTS["real_time_max_behind_s"], 0.05)
     with serving(tmp_path):
         listener = Listener(tmp_path)
         async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
@@ -188,7 +191,7 @@ async def test_a_radio_that_does_not_read_misses_samples_and_hinders_nobody(tmp_
             await until(lambda: ask(tmp_path).now_s > began_s + 0.5)
             taken += await take_gap(blocks)
             # From here on there are no more gaps, so the count is of those that were taken.
-            monkeypatch.setattr("backends.ether.real_time.MAX_BEHIND_S", FAR)
+            monkeypatch.setattr(*CONSTANTS["real_time_max_behind_s"], FAR)
             taken += await take(blocks, taken[-1].index + 20 * N)
             reports, more = await send(radio, blocks, [TxBurst(0, noise(100))])
             gone_s = ask(tmp_path).now_s - began_s

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import BackendError, EtherParams, ModemNeeds, find_backend, hub_at
-from backends.ether.remote_clock import WINDOW_S, HubClock
+from backends.testing import WINDOW_S, HubClock
 from tests.laws import law
 
 MS = 1_000_000

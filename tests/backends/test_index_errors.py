@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from backends import TxBurst, TxOutcome
-from backends.ether import Piece
-from backends.ether.antenna import Antenna
+from backends import Antenna, TxBurst, TxOutcome
+from backends.testing import Piece
 from tests.backends.airs import PLAIN, RATE, half_duplex
 from tests.backends.nodes import N, assert_contiguous, ether_of, line_of, run, sending
 from tests.backends.radios import noise

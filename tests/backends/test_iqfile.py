@@ -16,7 +16,7 @@ from backends import (
     TxOutcome,
     describe,
 )
-from backends.feed import MAX_WAITING
+from backends.testing import MAX_WAITING
 from phy import PROFILES, FrontEndParams, PathParams, warm_up
 from tests.backends.radios import (
     AIR,

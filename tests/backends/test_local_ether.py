@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from backends import GAP, BackendError, LinkOverride, RadioParams, Tuning, TxBurst, TxOutcome
-from backends.ether.medium import LEAD, NOISE_DBFS
+from backends.testing import LEAD, NOISE_DBFS
 from tests.backends.airs import CENTRE_HZ, PLAIN, RATE, burst, half_duplex, power_db
 from tests.backends.nodes import (
     BLOCK_S,

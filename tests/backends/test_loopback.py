@@ -9,9 +9,8 @@ import weakref
 import numpy as np
 import pytest
 
-from backends import Channel, LoopbackRadio, TxBurst, TxOutcome
-from backends.loopback import MAX_LATE_BLOCKS
-from backends.outstanding import GAP
+from backends import GAP, Channel, LoopbackRadio, TxBurst, TxOutcome
+from backends.testing import CONSTANTS, MAX_LATE_BLOCKS, Pace
 from phy import FrontEndParams, PathParams
 from tests.backends.radios import (
     AIR,
@@ -38,7 +37,7 @@ def noisy(seed=1, noise_dbfs=-20.0, **path):
 @pytest.fixture
 def few_waiting(monkeypatch):
     """Let only two blocks wait for the reader, so that it soon falls behind."""
-    monkeypatch.setattr("backends.feed.MAX_WAITING", 2)
+    monkeypatch.setattr(*CONSTANTS["max_waiting"], 2)
 
 
 async def gap_in(blocks, taken):
@@ -49,7 +48,7 @@ async def gap_in(blocks, taken):
 
 
 async def test_a_paced_loopback_runs_in_real_time(monkeypatch):
-    monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", FOREVER_S)
+    monkeypatch.setattr(*CONSTANTS["loopback_max_behind_s"], FOREVER_S)
     late_s = []
     async with opened(LoopbackRadio(AIR, BLOCK_S)) as radio:
         began = time.monotonic()
@@ -132,7 +131,7 @@ async def test_any_length_of_blocks_gives_the_same_samples():
 
 
 async def test_a_reader_far_behind_finds_a_gap(monkeypatch, few_waiting):
-    monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", 0.1)
+    monkeypatch.setattr(*CONSTANTS["loopback_max_behind_s"], 0.1)
     async with opened(LoopbackRadio(AIR, BLOCK_S)) as radio:
         sends = await hand_over(radio, [TxBurst(25_000, noise(50))])
         blocks = radio.blocks()
@@ -166,7 +165,7 @@ async def test_a_reader_far_behind_finds_a_gap(monkeypatch, few_waiting):
 async def test_a_reader_a_little_behind_gets_larger_blocks_and_loses_nothing(
     monkeypatch, few_waiting
 ):
-    monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", FOREVER_S)
+    monkeypatch.setattr(*CONSTANTS["loopback_max_behind_s"], FOREVER_S)
     burst = TxBurst(5000, noise(20_000))
     async with opened(LoopbackRadio(AIR, BLOCK_S)) as radio:
         (sending,) = await hand_over(radio, [burst])
@@ -185,7 +184,7 @@ async def test_a_reader_a_little_behind_gets_larger_blocks_and_loses_nothing(
 
 
 async def test_a_burst_for_a_time_that_went_by_leaves_behind_the_gap(monkeypatch, few_waiting):
-    monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", 0.02)
+    monkeypatch.setattr(*CONSTANTS["loopback_max_behind_s"], 0.02)
     async with opened(LoopbackRadio(AIR, BLOCK_S)) as radio:
         blocks = radio.blocks()
         await take(blocks, N)
@@ -198,7 +197,7 @@ async def test_a_burst_for_a_time_that_went_by_leaves_behind_the_gap(monkeypatch
 
 async def test_a_block_ends_where_a_burst_has_arrived(monkeypatch):
     """Nothing is gained by waiting for the rest of the block."""
-    monkeypatch.setattr("backends.pace.Pace.wait_for", lambda *_: 0)
+    monkeypatch.setattr(Pace, "wait_for", lambda *_: 0)
     async with opened(LoopbackRadio(AIR, BLOCK_S)) as radio:
         _, taken = await send(radio, radio.blocks(), [TxBurst(5000, noise(730))])
     end = 5730 + GAP

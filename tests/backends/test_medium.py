@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from backends import LinkOverride, Outage, RadioParams, Track, TxBurst
-from backends.ether.medium import NOISE_DBFS
+from backends.testing import NOISE_DBFS
 from phy import PROFILES, PduHeard, Receiver, Transmitter
 from tests.backends.airs import (
     CENTRE_HZ,

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import GAP, RadioParams
-from backends.ether.medium import LEAD, MARGIN
+from backends.testing import LEAD, MARGIN
 from phy import PROFILES
 from tests.backends.airs import (
     PLAIN,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from backends import LoopbackRadio, OffsetRadio, OversampledRadio
-from backends.dc import DcBlocker
+from backends.testing import DcBlocker
 from tests.backends.radios import (
     AIR,
     BLOCK_S,
@@ -20,7 +20,7 @@ from tests.backends.radios import (
     take,
     turn,
 )
-from tests.backends.test_oversampled import assert_heard, two_bursts
+from tests.backends.two_bursts import assert_heard, two_bursts
 
 pytestmark = pytest.mark.usefixtures("at_ease")
 

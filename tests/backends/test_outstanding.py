@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backends import TxBurst
-from backends.outstanding import GAP, Outstanding
+from backends import GAP, TxBurst
+from backends.testing import Outstanding
 from tests.laws import law
 
 

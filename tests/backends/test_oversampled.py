@@ -1,6 +1,5 @@
 """A radio at twice or four times the rate: callers see their own rate, bursts and gaps in place."""
 
-import numpy as np
 import pytest
 
 from backends import (
@@ -10,37 +9,16 @@ from backends import (
     RadioParams,
     Tuning,
     TxBurst,
-    TxOutcome,
     hub_in,
 )
-from backends.oversampled import TRIM
-from phy import REACH, Transmitter
+from backends.testing import TRIM
+from phy import REACH
 from tests.backends.hubs import NODE, EtherRadio, serving
 from tests.backends.radios import AIR, BLOCK_S, RATE, TUNING, heard, opened, send, take
+from tests.backends.two_bursts import assert_heard, two_bursts
 
 pytestmark = pytest.mark.usefixtures("at_ease")
 factors = pytest.mark.parametrize("factor", [2, 4])
-
-
-def two_bursts(first):
-    """Bursts of a modem; the second one has a `latest` that it will meet."""
-    rng = np.random.default_rng(6)
-    samples = [0.2 * Transmitter().modulate([rng.bytes(60)], 1) for _ in range(2)]
-    second = first + len(samples[0]) + 500
-    return [TxBurst(first, samples[0]), TxBurst(second, samples[1], second)]
-
-
-def assert_heard(stream, sent, reports, gain_db=0.0):
-    """Assert that each burst is where its report says, with only the filter's error."""
-    for burst, report in zip(sent, reports, strict=True):
-        assert report.outcome is TxOutcome.SENT
-        assert (report.start, report.end) == (burst.start, burst.start + len(burst.samples))
-        got = stream[report.start + REACH : report.end - REACH]
-        expected = burst.samples[REACH:-REACH]
-        gain = np.vdot(expected, got) / np.vdot(expected, expected)
-        assert 20 * np.log10(abs(gain)) == pytest.approx(gain_db, abs=0.05)
-        error = np.mean(np.abs(got - gain * expected) ** 2)
-        assert error < 1e-3 * np.mean(np.abs(gain * expected) ** 2)
 
 
 @factors

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from backends import SAMPLE_TYPES, BackendError, RecordingReader, RecordingWriter, describe
-from backends.recording import RAW_TYPES
+from backends.testing import RAW_TYPES
 from tests.backends.radios import RATE, TUNING, noise, read, record
 from tests.laws import law
 

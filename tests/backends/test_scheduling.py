@@ -1,22 +1,24 @@
 """What is asked of the kernel, and what becomes of it."""
 
-import itertools
 import os
+import platform
 import resource
 import subprocess
 import sys
+import time
+from itertools import groupby
 
 import pytest
 
-from backends import scheduling
-from backends.scheduling import REALTIME, Scheduling
+from backends import Scheduling, take_short_slices
+from backends.testing import REALTIME
 from tests.docs.pages import ROOT
 
 IN_A_PROCESS = """
 import os, resource, sys, threading
-from backends import scheduling
+from backends import Scheduling
 {setup}
-made = scheduling.Scheduling(is_urgent={urgent})
+made = Scheduling(is_urgent={urgent})
 found = []
 thread = threading.Thread(target=lambda: found.append(os.sched_getscheduler(0)))
 thread.start()
@@ -65,26 +67,24 @@ def test_a_device_gets_what_is_granted():
 
 
 def test_a_machine_without_these_calls_goes_on(monkeypatch):
-    monkeypatch.setattr(scheduling.platform, "machine", lambda: "riscv64")
-    assert not scheduling.take_short_slices()
+    monkeypatch.setattr(platform, "machine", lambda: "riscv64")
+    assert not take_short_slices()
 
 
 def test_a_whole_core_at_real_time_priority_is_given_up_for_a_second(monkeypatch):
     clock, cpu, policies = [100.0], [0.0], []
-    monkeypatch.setattr(scheduling, "hurry", lambda: True)
-    monkeypatch.setattr(scheduling, "lock_memory", lambda: True)
-    monkeypatch.setattr(scheduling, "take_short_slices", lambda: True)
-    monkeypatch.setattr(scheduling.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(scheduling.time, "process_time", lambda: cpu[0])
-    monkeypatch.setattr(
-        scheduling.os, "sched_setscheduler", lambda _, policy, __: policies.append(policy)
-    )
+    granted = {resource.RLIMIT_RTPRIO: REALTIME, resource.RLIMIT_MEMLOCK: 0}
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (granted[which], granted[which]))
+    monkeypatch.setattr(os, "sched_setscheduler", lambda _, policy, __: policies.append(policy))
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(time, "process_time", lambda: cpu[0])
     made = Scheduling(is_urgent=True)
     for tenth in range(45):
         clock[0] += 0.1
         cpu[0] += 0.05 if tenth < 10 else 0.099
         made.look()
-    # Each time, every thread of this process gets the policy.
-    changes = [policy for policy, _ in itertools.groupby(policies)]
-    assert changes == [os.SCHED_OTHER, os.SCHED_RR, os.SCHED_OTHER]
+    # Once for each thread.
+    taken = [policy for policy, _ in groupby(policies)]
+    assert taken == [os.SCHED_RR, os.SCHED_OTHER, os.SCHED_RR, os.SCHED_OTHER]
     assert made.yields == 2

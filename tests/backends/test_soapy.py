@@ -20,13 +20,10 @@ from backends import (
     TxOutcome,
     probe_devices,
 )
-from backends.soapy.binding import driver_of
-from backends.soapy.binding.api import DriverError, StreamResult, check_buffer, check_result
-from backends.soapy.driver_log import DriverLog
-from backends.soapy.protocol.ring import SampleRing, make_shared
-from backends.soapy.radio_process.clock import SampleClock
-from backends.soapy.radio_process.tx_stream import TxStream
-from backends.soapy.settings.tx_timing import timing_of
+from backends.soapy.binding import DriverError, StreamResult, driver_of
+from backends.soapy.protocol import SampleRing, make_shared
+from backends.soapy.settings import timing_of
+from backends.testing import DriverLog, SampleClock, TxStream, check_buffer, check_result
 from tests.backends.radios import RATE, TUNING, N, noise, opened, take, turn
 from tests.soapy_loopback import Bus, missing
 
@@ -229,6 +226,7 @@ async def test_a_rate_that_the_device_does_not_offer_is_refused():
         await radio(model="usrp").open(Tuning(RATE, 915e6))
 
 
+@pytest.mark.slow
 @needs_radio
 def test_a_probe_tells_what_devices_can_do_and_which_module_is_missing():
     (found,) = probe_devices("driver=loopback,model=hackrf").devices

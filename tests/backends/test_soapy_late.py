@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 from backends import SoapyRadio, SoapySettings, TxBurst, TxOutcome
-from backends.soapy.binding.api import END_BURST, NOT_SUPPORTED, StreamResult
-from backends.soapy.protocol.control import TxCommand
-from backends.soapy.radio_process.clock import SampleClock
-from backends.soapy.radio_process.timestamped_tx import TimestampedTransmitter
-from backends.soapy.radio_process.tx_stream import TxStream
+from backends.soapy.binding import END_BURST, NOT_SUPPORTED, StreamResult
+from backends.soapy.protocol import TxCommand
+from backends.testing import SampleClock, TimestampedTransmitter, TxStream
 from tests.backends.radios import RATE, N, noise, opened, take, turn
 from tests.soapy_loopback import Bus, missing
 

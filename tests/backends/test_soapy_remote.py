@@ -43,8 +43,8 @@ def lacking():
     return "needs namespaces of its own" if may.returncode else ""
 
 
+@pytest.mark.long
 @pytest.mark.realtime
-@pytest.mark.slow
 @pytest.mark.skipif(bool(lacking()), reason=lacking())
 def test_a_device_behind_soapyremote_keeps_time_as_if_it_were_here():
     # The driver module is among the system's modules.

@@ -91,7 +91,7 @@ def test_pushes_are_the_same_whatever_the_controller_knows():
     assert np.array_equal(a, b)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_loop_that_knows_how_old_things_are_strays_less():
     old, fresh = rows.corrections(3, 2)
     assert old.exact

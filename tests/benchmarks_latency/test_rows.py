@@ -9,14 +9,14 @@ from benchmarks.latency.session import Session, run
 from benchmarks.peers.latency import ours, table
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_by_the_air_latencies_and_ages_are_exact():
     told = {row.name: row for row in rows.by_the_air(3, 1.0)}
     assert set(told) == {"ether_115B_200hz_lockstep_std_ms", "age_rms_us_lockstep"}
     assert all(row.ok and row.trials > 350 for row in told.values())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_records_keep_to_their_share_and_every_receipt_is_a_delivery():
     fast, slow = rows.shares(3, 20.0)
     assert fast.ok, fast
@@ -67,7 +67,7 @@ def test_the_papers_table():
     assert loads[0].peers == {"direct": 0.3, "xrce": 0.3}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_our_own_daemon_is_measured_like_the_others():
     session = run("direct", seconds=0.5, warmup_s=0.2)
     for way in (session.forward, session.backward):
@@ -79,7 +79,7 @@ def test_our_own_daemon_is_measured_like_the_others():
     assert ours.TOPICS["ether"] == 15
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_our_daemons_on_the_line_of_the_others():
     session = run("line", seconds=0.5, warmup_s=0.2)
     least_s = table.PEERS["line"].on_the_line_s(115)

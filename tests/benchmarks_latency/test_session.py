@@ -12,7 +12,7 @@ FRAME = 134
 """Minimum size of a frame in bytes."""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_xrce_from_end_to_end():
     session = run("xrce", seconds=0.5, warmup_s=0.2)
     for way in (session.forward, session.backward):

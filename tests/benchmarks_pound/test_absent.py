@@ -14,7 +14,7 @@ from benchmarks.peers.pound.namespaces import Network, Node
 from benchmarks.pound import __main__ as pound
 from benchmarks.pound import beside, limits, realtime
 from benchmarks.report import Row
-from tests.benchmarks_pound.test_peers import in_namespaces
+from tests.benchmarks_pound.machine import in_namespaces
 
 BROKEN = "libzenohc.so: cannot open shared object file"
 
@@ -76,7 +76,7 @@ def test_a_peer_that_does_not_start_is_named_and_costs_no_row(monkeypatch, capsy
     assert "Traceback" not in err
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_daemons_that_do_not_start_cost_their_own_rows_only(monkeypatch, capsys):
     """The first pair of daemons ends at once; the one daemon works, until its second pass."""
     made = []
@@ -109,8 +109,7 @@ def test_daemons_that_do_not_start_cost_their_own_rows_only(monkeypatch, capsys)
     assert "rate_hz" in absent.told()["two daemons and an outage"]
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(250)
+@pytest.mark.long
 @in_namespaces
 def test_the_whole_benchmark_goes_on_without_a_peer(monkeypatch, capsys, broken_zenoh):
     monkeypatch.setattr(beside, "QUICK", ("zenoh_drop", "tcp_nodelay"))

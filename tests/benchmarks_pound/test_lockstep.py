@@ -5,6 +5,7 @@ from itertools import islice
 import pytest
 
 from benchmarks.pound import channel_rows, rows
+from tests.laws import one_in
 
 SEED = 1
 PHASES = [0.004, 0.033]
@@ -21,16 +22,19 @@ def missed(measured):
     return {row.name for row in measured if not row.ok}
 
 
-@pytest.mark.parametrize("measure", [rows.two_nodes, rows.bandwidth, rows.outage])
+@pytest.mark.slow
+@pytest.mark.parametrize("measure", one_in(3, [rows.two_nodes, rows.bandwidth, rows.outage]))
 def test_rows_with_an_air_each_way_meet_their_targets(measure):
     assert missed(measure(SEED, False, {})) == set()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("measure", [rows.urgent, rows.plan])
 def test_rows_of_priority_and_of_the_plan_meet_their_targets(measure):
     assert missed(measure(SEED, False)) == set()
 
 
+@pytest.mark.long
 def test_on_one_channel_the_images_delay_deviates_more_than_in_the_paper():
     found = figures(islice(channel_rows.two_nodes(SEED, False, {}), TUNED))
     assert missed(found.values()) == {"image_1ch_stdD_ms"}
@@ -39,7 +43,7 @@ def test_on_one_channel_the_images_delay_deviates_more_than_in_the_paper():
     assert set(found["laser_1ch_D_ms"].peers) == {"minislot", "csma", "tdma", "auction", "grant"}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_with_the_defaults_one_channel_does_not_carry_the_images():
     found = list(islice(channel_rows.two_nodes(SEED, False, {}), TUNED, None))
     assert missed(found) == {
@@ -50,17 +54,17 @@ def test_with_the_defaults_one_channel_does_not_carry_the_images():
     }
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_rows_over_two_hops_meet_their_targets():
     assert missed(rows.three_nodes(SEED, False, {})) == set()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_on_one_channel_a_relay_that_returns_is_used_before_the_papers():
     assert missed(channel_rows.outage(SEED, True, {})) == set()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_control_loop_is_late_by_milliseconds():
     (row,) = rows.control_loop(SEED, PHASES, {})
     assert missed([row]) == {"rlc_rms_vs_local_mV"}

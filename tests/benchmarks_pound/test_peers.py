@@ -3,7 +3,6 @@
 import contextlib
 import os
 import re
-import shutil
 import subprocess
 import sys
 import time
@@ -37,20 +36,7 @@ from benchmarks.peers.pound.wire import (
     cut_tcpros,
     cut_udpros,
 )
-from tests.machine import ROOT as NO_ROOT
-from tests.machine import lacks
-
-
-def no_network():
-    """Why no namespaces are available here; "" if they are."""
-    if not shutil.which("tc"):
-        return lacks("iproute2")
-    if os.geteuid():
-        return f"{NO_ROOT}, for network namespaces"
-    return namespaces.available() or ""
-
-
-in_namespaces = pytest.mark.skipif(bool(no_network()), reason=no_network())
+from tests.benchmarks_pound.machine import in_namespaces
 
 messages = st.integers(8, 20_000).map(lambda size: bytes(i % 251 for i in range(size)))
 

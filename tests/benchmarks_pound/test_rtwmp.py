@@ -204,6 +204,7 @@ def test_the_worst_case_is_reached():
     assert max(hops.values()) >= 2 * n - 4
 
 
+@pytest.mark.slow
 @law(60)
 @given(graphs(), st.data())
 def test_the_most_important_message_of_the_network_goes_first(graph, data):
@@ -289,6 +290,7 @@ def kill_the_holder(n, links, node):
     return heard, died
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("graph", [(4, mesh(4)), (4, chain(4)), (2, mesh(2))])
 def test_the_token_is_issued_again_after_the_death_of_its_holder(graph):
     n, links = graph
@@ -371,6 +373,7 @@ def test_frames_that_overlap_are_lost():
     assert senders(2) == [0, 2], "node 1 has nothing to pass on"
 
 
+@pytest.mark.slow
 def test_the_papers_tables():
     laser, image = map(figures, tables(2, 1, True, FITTED))
     assert laser.d_ms == pytest.approx(4.7, rel=0.1)

@@ -18,7 +18,7 @@ from benchmarks.realtime.turns import (
     rows_of,
     with_least_stolen,
 )
-from tests.test_benchmarks import ROWS
+from tests.benchmark_rows import ROWS
 
 LATE = Wanted("late", "ms", 5.0)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.bus import envelope
+from sdrlinkd.bus.testing import OutHeader, decode, encode
 from sdrlinkd.client import pack_map
 from sdrlinkd.errors import EnvelopeError
 from tests.laws import law
@@ -17,18 +17,18 @@ CDR = b"\0\1\0\0data"
 
 
 @pytest.mark.parametrize(
-    "encode", [lambda m: b"\x01" + pack_map(m), lambda m: json.dumps(m).encode()]
+    "pack", [lambda m: b"\x01" + pack_map(m), lambda m: json.dumps(m).encode()]
 )
-def test_header_in_messagepack_or_json(encode):
+def test_header_in_messagepack_or_json(pack):
     fields = {"q": "latency", "p": 90, "d": 2, "ls": 250.0, "ty": "nav_msgs/msg/Odometry", "new": 1}
-    topic, header, payload = envelope.decode([TOPIC, encode(fields), CDR])
+    topic, header, payload = decode([TOPIC, pack(fields), CDR])
     assert (topic, payload) == (TOPIC, CDR)
     assert (header.q, header.p, header.d, header.ls) == ("latency", 90, 2, 250.0)
 
 
 @pytest.mark.parametrize("empty", [b"\x01\x80", b"{}"])
 def test_a_header_may_say_nothing(empty):
-    assert envelope.decode([TOPIC, empty, CDR]) == (TOPIC, None, CDR)
+    assert decode([TOPIC, empty, CDR]) == (TOPIC, None, CDR)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_a_header_may_say_nothing(empty):
 )
 def test_refused_with_a_reason(frames, says):
     with pytest.raises(EnvelopeError, match=says):
-        envelope.decode(frames)
+        decode(frames)
 
 
 @law(500)
@@ -63,14 +63,14 @@ def test_any_frames_decode_or_are_refused(frames, plausible):
         frames[0] += b"\0"
         frames[1] = b"\x01" + frames[1]
     try:
-        envelope.decode(frames)
+        decode(frames)
     except EnvelopeError:
         return
     assert len(frames) == 3
 
 
 def test_out_header_leaves_out_what_is_unknown():
-    header = envelope.OutHeader(s=1, n=2, tr=3, ty="a/msg/B")
-    frames = envelope.encode(TOPIC, header, CDR)
+    header = OutHeader(s=1, n=2, tr=3, ty="a/msg/B")
+    frames = encode(TOPIC, header, CDR)
     assert frames[0] == TOPIC
     assert msgspec.msgpack.decode(frames[1][1:]) == {"s": 1, "n": 2, "tr": 3, "ty": "a/msg/B"}

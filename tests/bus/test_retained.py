@@ -3,8 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.bus.envelope import OutHeader
-from sdrlinkd.bus.retained import Retained, Retention
+from sdrlinkd.bus.testing import OutHeader, Retained, Retention
 
 
 def message(topic="map", number=1, at=0.0, size=8, age=None, **more):

@@ -1,11 +1,12 @@
 """Answers wait for a subscriber with a full queue, and for no other subscriber."""
 
 import asyncio
+import time
 
 import pytest
 import zmq
 
-from sdrlinkd.bus import undropped
+from sdrlinkd.bus.testing import CONSTANTS, Undropped
 
 ROOM = 4
 """Number of messages that fit for a subscriber here, in both ends of the pipe together."""
@@ -48,9 +49,9 @@ async def until(condition):
 
 
 async def test_who_has_no_room_waits_and_nobody_else(sockets, monkeypatch):
-    monkeypatch.setattr(undropped, "STUCK_S", 1000.0)
+    monkeypatch.setattr(*CONSTANTS["stuck_s"], 1000.0)
     out, slow, quick = sockets
-    certain = undropped.Undropped(asyncio.get_running_loop(), out, lambda: None)
+    certain = Undropped(asyncio.get_running_loop(), out, lambda: None)
     for frames in numbered(b"slow", range(20)):
         certain.send(b"slow", frames)
     for frames in numbered(b"quick", range(ROOM)):
@@ -71,10 +72,10 @@ async def test_who_has_no_room_waits_and_nobody_else(sockets, monkeypatch):
 
 
 async def test_who_does_not_read_at_all_is_given_up_until_it_does(sockets, monkeypatch):
-    monkeypatch.setattr(undropped, "STUCK_S", 0.0)
+    monkeypatch.setattr(*CONSTANTS["stuck_s"], 0.0)
     out, slow, _ = sockets
     used = []
-    certain = undropped.Undropped(asyncio.get_running_loop(), out, lambda: used.append(True))
+    certain = Undropped(asyncio.get_running_loop(), out, lambda: used.append(True))
     for frames in numbered(b"slow", range(20)):
         certain.send(b"slow", frames)
     await until(lambda: len(used) > 20)  # it has tried again
@@ -84,7 +85,7 @@ async def test_who_does_not_read_at_all_is_given_up_until_it_does(sockets, monke
     certain.send(b"slow", [b"slow", b"21"])
     assert heard(slow) == [21]
     # It is waited for again.
-    monkeypatch.setattr(undropped, "STUCK_S", 1000.0)
+    monkeypatch.setattr(*CONSTANTS["stuck_s"], 1000.0)
     out.get(zmq.EVENTS)
     for frames in numbered(b"slow", range(20)):
         certain.send(b"slow", frames)
@@ -101,11 +102,11 @@ async def test_who_does_not_read_at_all_is_given_up_until_it_does(sockets, monke
 
 async def test_at_the_end_there_is_a_little_time(sockets, monkeypatch):
     out, slow, _ = sockets
-    certain = undropped.Undropped(asyncio.get_running_loop(), out, lambda: None)
+    certain = Undropped(asyncio.get_running_loop(), out, lambda: None)
     for frames in numbered(b"slow", range(20)):
         certain.send(b"slow", frames)
     got = []
-    monkeypatch.setattr(undropped.time, "sleep", lambda _: got.extend(heard(slow)))
+    monkeypatch.setattr(time, "sleep", lambda _: got.extend(heard(slow)))
     certain.close(30.0)
     got += heard(slow)
     assert got == list(range(20))

@@ -63,8 +63,7 @@ def test_topics_check_reload(start_daemon, ctl):
     assert (code, "reloaded" in out) == (0, True)
 
 
-def test_pub_and_echo(start_daemon, ctl):
-    daemon = start_daemon()
+def test_pub_and_echo(daemon, ctl):
     dir_ = ("--runtime-dir", daemon.directory)
     done = threading.Event()
 
@@ -100,8 +99,7 @@ def test_pub_says_what_became_of_each_message(start_daemon, ctl):
     assert code == 1
 
 
-def test_pub_refuses_in_words(start_daemon, ctl):
-    daemon = start_daemon()
+def test_pub_refuses_in_words(daemon, ctl):
     dir_ = ("--runtime-dir", daemon.directory)
     for arguments, says in (
         (("/robot_1/nothing",), "allowed: /robot_1/scan"),
@@ -181,8 +179,7 @@ def test_pdu_watch_ends_with_the_daemon(start_daemon):
     assert "no sdrlinkd answers" in watch.err()
 
 
-def test_echo_says_when_nothing_comes(start_daemon, ctl):
-    daemon = start_daemon()
+def test_echo_says_when_nothing_comes(daemon, ctl):
     code, _, err = ctl(
         "echo", "/rx_robot_9/odom", "--timeout", "0.1", "--runtime-dir", daemon.directory
     )
@@ -264,8 +261,7 @@ def test_bag_play_and_info(start_daemon, ctl, recorded):
         assert (code, says in err) == (2, True), err
 
 
-def test_a_bag_whose_names_have_no_slash_is_played(start_daemon, ctl, tmp_path):
-    daemon = start_daemon()
+def test_a_bag_whose_names_have_no_slash_is_played(daemon, ctl, tmp_path):
     messages = [("odom", "nav_msgs/msg/Odometry", 1_000_000 * i, bytes(724)) for i in range(20)]
     bag = ros2_bag(tmp_path / "bag", StoragePlugin.MCAP, messages)
     for topics in ((), ("--topics", "odom"), ("--remap", "odom:=/robot_1/odom")):
@@ -328,8 +324,7 @@ def test_pdu_decode_shows_the_layout(ctl, tmp_path):
     assert "allowed: octets" in err
 
 
-def test_pdu_watch_shows_both_directions(start_daemon):
-    daemon = start_daemon()
+def test_pdu_watch_shows_both_directions(daemon):
     with sdrlinkctl("pdu", "watch", "-n", "4", "--runtime-dir", daemon.directory) as watch:
         while watch.is_running:
             publish(daemon, 1)
@@ -405,10 +400,7 @@ def test_a_policy_is_set_while_the_daemon_runs_and_explained(start_daemon, ctl):
         (["odom"], ["nothing to change"]),
     ],
 )
-def test_a_policy_that_is_not_allowed_is_refused_and_changes_nothing(
-    start_daemon, ctl, arguments, parts
-):
-    daemon = start_daemon()
+def test_a_policy_that_is_not_allowed_is_refused_and_changes_nothing(daemon, ctl, arguments, parts):
     # Not even what is right next to it is accepted.
     more = ["--depth", "3"] if len(arguments) > 1 else []
     code, _, err = ctl("set", *arguments, *more, "--runtime-dir", daemon.directory)

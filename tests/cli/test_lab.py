@@ -1,5 +1,6 @@
 """`sdrlinkctl lab`: one command runs a scenario; report and figures are in a folder."""
 
+import sys
 import time
 from pathlib import Path
 
@@ -10,8 +11,9 @@ from backends import HubWatch
 from sdrlinkd.cli import run
 from sdrlinkd.cli.pace import scenario_names
 from sdrlinkd.drive import read_drive
+from sdrlinkd.extras import hint
 from sdrlinkd.lab import LabReport, find_scenario
-from sdrlinkd.lab import run as run_module
+from sdrlinkd.lab.testing import Listener
 from tests.conftest import ETC
 from tests.lab.reports import report, robot
 from tests.lab.scenarios import write_scenario
@@ -30,17 +32,21 @@ sends = false
 OUTAGE = "[outages]\ntimes = [[0.76, 1.16]]\n[daemon.repeat]\nshare = 0.0\n"
 
 
-class LateListener(run_module.Listener):
+@pytest.fixture
+def late(monkeypatch):
     """The lab starts late to listen to robot 2: the air has to wait for it."""
+    begin = Listener.__init__
 
-    def __init__(self, directory, by_age):
+    def begin_late(listener, directory, by_age):
         if directory.name == "robot_2":
             give_up_at = time.monotonic() + 1.0
             with HubWatch(directory.parent / "hub") as watch:
                 # Without effect if the air waits.
                 while watch.ask().now_s < 0.5 and time.monotonic() < give_up_at:
                     pass
-        super().__init__(directory, by_age)
+        begin(listener, directory, by_age)
+
+    monkeypatch.setattr(Listener, "__init__", begin_late)
 
 
 @pytest.fixture
@@ -82,8 +88,7 @@ def asked(come_to):
 
 
 @pytest.mark.slow
-def test_a_run_is_told_drawn_and_written(lab, tmp_path, monkeypatch):
-    monkeypatch.setattr(run_module, "Listener", LateListener)
+def test_a_run_is_told_drawn_and_written(lab, tmp_path, late):
     path = write_scenario(tmp_path, robots=LISTENING_ROBOT, extra=OUTAGE)
     code, out, _ = lab(path, "--duration", 2, "--seed", 5)
     assert code == 0
@@ -122,6 +127,16 @@ def test_options_go_before_the_scenario(lab, asked, tmp_path):
     assert (scenario.duration_s, scenario.seed, scenario.pace) == (1.5, 9, "realtime")
     assert scenario.daemon == {"modem": {"mcs": 2}, "access": {"policy": "csma", "force": True}}
     assert (options.path, options.bag, options.traces) == (path, tmp_path / "bag", tmp_path)
+
+
+def test_without_jinja_there_is_no_page_and_the_last_line_says_how_to_get_it(
+    lab, asked, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    code, out, _ = lab(write_scenario(tmp_path))
+    *_, wrote, last = out.splitlines()
+    assert (code, wrote.endswith("out/report.json, drive.mcap"), last) == (0, True, hint("plots"))
+    assert not (tmp_path / "out/lab.png").exists()
 
 
 def test_without_options_the_scenario_is_as_written(lab, asked, tmp_path):

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import sigmf
 
+from backends.testing import CONSTANTS
 from sdrlinkd.process import wait_until
 from tests.iq.recordings import write_bursts
 from tests.programs import sdrlinkctl
@@ -147,7 +148,7 @@ def test_values_out_of_range_are_refused_with_what_is_allowed(ctl, tmp_path, opt
 def test_configurations_without_a_radio_to_record_from_are_refused(
     ctl, config, tmp_path, monkeypatch, backend, more, arguments, says
 ):
-    monkeypatch.setattr("backends.ether.radio.ANSWER_MS", 50)
+    monkeypatch.setattr(*CONSTANTS["hub_answer_ms"], 50)
     given = ("--config", config(backend, more), *arguments)
     code, out, err = ctl("record", tmp_path / "rec", *given)
     assert (code, out) == (2, ""), err

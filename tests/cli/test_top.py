@@ -64,6 +64,7 @@ async def shown(pilot, moments):
     await pilot.pause()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "name"), [((80, 24), "top"), ((140, 40), "top-140x40")])
 async def test_the_screen_is_the_stored_one(size, name):
     async with make_app().run_test(size=size) as pilot:

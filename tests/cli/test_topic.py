@@ -71,8 +71,8 @@ def measuring(daemon, *arguments):
     ("bw", r"\S+ [KM]?B/s from 50 messages\n\tMessage size mean: 708 B min: 708 B max: 708 B\n"),
     ("delay", r"average delay: \d\.\d{3}\n\tmin: \S+s max: \S+s std dev: \S+s window: 50\n"),
 ])  # fmt: skip
-def test_a_topic_heard_is_measured(start_daemon, what, pattern):
-    told, size = measuring(start_daemon(), what, HEARD, "--count", "50")
+def test_a_topic_heard_is_measured(daemon, what, pattern):
+    told, size = measuring(daemon, what, HEARD, "--count", "50")
     assert size == 708
     assert re.search(HEARD + r": 50 messages in \d+\.\d s\n" + pattern + "$", told), told
 
@@ -87,8 +87,8 @@ def test_ctrl_c_ends_with_a_summary(start_daemon):
     assert "Traceback" not in topic.err()
 
 
-def test_what_is_not_heard_is_told(start_daemon, capsys):
-    there = ("--runtime-dir", str(start_daemon().directory))
+def test_what_is_not_heard_is_told(daemon, capsys):
+    there = ("--runtime-dir", str(daemon.directory))
     assert run(["topic", "hz", ODOM, *there]) == 2
     assert "this robot sends it; received topics have names such as" in capsys.readouterr().err
     assert run(["topic", "bw", "/rx_robot_9/odom", "--duration", "0.05", *there]) == 2
@@ -109,6 +109,7 @@ def test_list_finds_a_daemon_wherever_its_directory_is(start_daemon, capsys):
     assert str(daemon.directory) not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_list_finds_a_directory_that_is_named_from_where_the_daemon_was_started(
     tmp_path, write_config, capsys
 ):
@@ -137,8 +138,7 @@ def completed(words, directory):
     return done.stdout.split()
 
 
-def test_tab_knows_live_names(start_daemon):
-    daemon = start_daemon()
+def test_tab_knows_live_names(daemon):
     with Publisher(daemon.directory) as out:
         out.send(ODOM, to_cdr(empty(KIND), KIND))
     wait_for(lambda: daemon.snapshot().link.received != [])

@@ -147,8 +147,7 @@ class Terminal:
 
 
 @pytest.mark.parametrize(("way", "code"), [("q", 0), ("\x03", 0), (signal.SIGTERM, 143)])
-def test_top_leaves_the_terminal_as_it_was(start_daemon, way, code):
-    daemon = start_daemon()
+def test_top_leaves_the_terminal_as_it_was(daemon, way, code):
     terminal = Terminal("top", "--runtime-dir", daemon.directory)
     wait_for(lambda: terminal.shows("/robot_1/odom"), 60)
     if isinstance(way, str):

@@ -90,7 +90,9 @@ def test_the_wheel_is_the_client_alone(wheel, start_daemon, tmp_path):
         names = archive.namelist()
         (about,) = (archive.read(name).decode() for name in names if name.endswith("METADATA"))
     ours = {str(path.relative_to(ROOT)) for folder in FILES[1:] for path in folder.glob("*.py")}
-    assert {name for name in names if name.endswith(".py")} == {"sdrlinkd/__init__.py", *ours}
+    assert {name for name in names if name.endswith(".py")} == {
+        f"sdrlinkd_client/{name}" for name in ("sdrlinkd/__init__.py", *ours)
+    }
     assert [line for line in about.splitlines() if line.startswith("Requires-")] == [
         "Requires-Python: >=3.10", "Requires-Dist: pyzmq>=22.3",
     ]  # fmt: skip

@@ -17,13 +17,13 @@ from sdrlinkd.client import (
     Publisher,
     Subscriber,
 )
-from sdrlinkd.client.messages import topic_filter
+from sdrlinkd.client.testing import topic_filter
 
 CDR = b"\0\1\0\0"
 
 
-def test_five_lines_each(start_daemon, monkeypatch):
-    monkeypatch.setenv("SDRLINKD_RUNTIME_DIR", str(start_daemon().directory))
+def test_five_lines_each(daemon, monkeypatch):
+    monkeypatch.setenv("SDRLINKD_RUNTIME_DIR", str(daemon.directory))
     with Subscriber("/rx_robot_1/odom") as heard:
         with Publisher() as out:
             out.send("/robot_1/odom", CDR + b"hello")
@@ -32,8 +32,8 @@ def test_five_lines_each(start_daemon, monkeypatch):
             break
 
 
-async def test_five_lines_each_in_asyncio(start_daemon, monkeypatch):
-    monkeypatch.setenv("SDRLINKD_RUNTIME_DIR", str(start_daemon().directory))
+async def test_five_lines_each_in_asyncio(daemon, monkeypatch):
+    monkeypatch.setenv("SDRLINKD_RUNTIME_DIR", str(daemon.directory))
     async with AsyncSubscriber("/rx_robot_1/odom") as heard:
         async with AsyncPublisher() as out:
             await out.send("/robot_1/odom", CDR + b"hello")
@@ -42,8 +42,7 @@ async def test_five_lines_each_in_asyncio(start_daemon, monkeypatch):
             break
 
 
-async def test_receipts_in_asyncio(start_daemon):
-    daemon = start_daemon()
+async def test_receipts_in_asyncio(daemon):
     async with AsyncPublisher(daemon.directory) as out:
         assert await out.receipt(0) is None, "none was asked for"
         assert await out.send("/robot_1/odom", CDR) is None
@@ -179,8 +178,7 @@ async def test_without_a_daemon_in_asyncio(tmp_path):
 
 
 @pytest.mark.parametrize("header", [json.dumps({"q": "urgent", "p": 3}).encode(), b"\x01\x80"])
-def test_a_program_that_publishes_with_pub(start_daemon, header):
-    daemon = start_daemon()
+def test_a_program_that_publishes_with_pub(daemon, header):
     context = zmq.Context()
     with context.socket(zmq.PUB) as pub, Subscriber(directory=daemon.directory) as heard:
         pub.connect(f"ipc://{daemon.directory}/in-pub.sock")
@@ -192,8 +190,7 @@ def test_a_program_that_publishes_with_pub(start_daemon, header):
     context.term()
 
 
-def test_the_welcome_tells_who_answers(start_daemon):
-    daemon = start_daemon()
+def test_the_welcome_tells_who_answers(daemon):
     context = zmq.Context()
     with context.socket(zmq.SUB) as sub:
         sub.subscribe(b"\0")

@@ -8,15 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.client import (
+    OUT_SOCKET,
     AsyncPublisher,
     AsyncSubscriber,
     NoDaemonError,
     Publisher,
     Subscriber,
+    endpoint,
     pack_map,
 )
-from sdrlinkd.client.arrivals import Arrivals
-from sdrlinkd.client.paths import OUT_SOCKET, endpoint
+from sdrlinkd.client.testing import Arrivals
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"

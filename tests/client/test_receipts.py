@@ -15,9 +15,8 @@ from sdrlinkd.client import (
     AsyncPublisher,
     Publisher,
     pack_map,
-    producer,
 )
-from sdrlinkd.client.messages import new_ack_topic
+from sdrlinkd.client.testing import CONSTANTS, new_ack_topic
 from tests.conftest import ETC
 from tests.programs import Daemon
 from tests.waiting import wait_for
@@ -171,8 +170,8 @@ def test_a_daemon_that_is_restarted_owes_nothing(start_daemon, spawn_again):
 @pytest.fixture
 def impatient(monkeypatch):
     """A producer that assumes sooner that a daemon is gone."""
-    monkeypatch.setattr(producer, "STILL_THERE_S", 0.1)
-    monkeypatch.setattr(producer, "GONE_S", 0.5)
+    monkeypatch.setattr(*CONSTANTS["still_there_s"], 0.1)
+    monkeypatch.setattr(*CONSTANTS["gone_s"], 0.5)
 
 
 def test_a_daemon_that_never_comes_back_owes_nothing(start_daemon, impatient):

@@ -14,9 +14,8 @@ from sdrlinkd.client import (
     Publisher,
     Subscriber,
     pack_map,
-    producer,
 )
-from sdrlinkd.client.messages import new_ack_topic
+from sdrlinkd.client.testing import CONSTANTS, new_ack_topic
 from tests.conftest import ETC
 from tests.waiting import wait_for
 
@@ -102,8 +101,7 @@ def test_send_refuses_in_the_daemons_words(start_daemon):
         wait_for(lambda says=says: daemon.snapshot().bus.bad_envelope_last == says)
 
 
-async def test_send_refuses_in_asyncio(start_daemon):
-    daemon = start_daemon()
+async def test_send_refuses_in_asyncio(daemon):
     async with AsyncPublisher(daemon.directory) as out:
         for wishes, says in WISHES:
             with pytest.raises(MessageRefusedError) as refused:
@@ -161,7 +159,7 @@ def registry_of(folder, *names):
 def looking(request, monkeypatch):
     """A producer that queries the daemon again after a restart, before it refuses."""
     if request.param == "only asks":
-        monkeypatch.setattr(producer, "LOOK_S", 1e9)
+        monkeypatch.setattr(*CONSTANTS["look_s"], 1e9)
 
 
 def test_a_daemon_with_another_registry_is_believed(start_daemon, restart, tmp_path, looking):
@@ -252,15 +250,12 @@ def test_never_blocking(start_daemon, stop, spawn_again, tmp_path):
 
 
 @pytest.mark.parametrize("make", [Publisher, AsyncPublisher])
-async def test_a_daemon_that_answers_but_takes_nothing_yet_is_waited_for(
-    start_daemon, tmp_path, make
-):
+async def test_a_daemon_that_answers_but_takes_nothing_yet_is_waited_for(daemon, tmp_path, make):
     """The two sockets connect one by one; a program that waited may send without blocking."""
 
     async def result(value):
         return await value if asyncio.iscoroutine(value) else value
 
-    daemon = start_daemon()
     (tmp_path / "out.sock").symlink_to(daemon.directory / "out.sock")
     out = make(tmp_path)
     try:

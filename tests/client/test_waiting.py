@@ -15,7 +15,7 @@ from sdrlinkd.client import (
     Subscriber,
     pack_map,
 )
-from sdrlinkd.client.deadline import Deadline, milliseconds
+from sdrlinkd.client.testing import Deadline, milliseconds
 
 CDR = b"\0\1\0\0abcd"
 HEADER = b"\x01" + pack_map({"s": 1, "n": 1})

@@ -3,7 +3,7 @@
 import pytest
 
 from sdrlinkd.config import ModemParams, cfo_told, cfo_warning, make_setup, parse_config
-from tests.config.test_config import ETC
+from tests.conftest import ETC
 
 SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=x"\n[modem]\n'
 

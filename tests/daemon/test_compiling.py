@@ -21,8 +21,8 @@ def test_a_daemon_without_a_compiled_modem_takes_messages_says_so_and_can_be_sto
     """Its radio is opened after the compilation."""
     # In the daemon's process and in that of its modem.
     (tmp_path / "sitecustomize.py").write_text(
-        "from pathlib import Path\nfrom phy.engine import files\n"
-        f"files._folders = lambda: iter([Path({str(tmp_path / 'cold')!r})])\n"
+        "from pathlib import Path\nfrom phy.testing import files\n"
+        f"files.folders = lambda: iter([Path({str(tmp_path / 'cold')!r})])\n"
     )
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{Path(phy.__file__).parents[1]}")
     daemon = start_daemon(

@@ -6,10 +6,10 @@ from random import Random
 import pytest
 
 from sdrlinkd.adapters import empty, to_cdr
-from sdrlinkd.adapters.typestore import ros2_types
+from sdrlinkd.adapters.testing import ros2_types
 from sdrlinkd.client import MessageRefusedError, Publisher, RefusedError, Subscriber
 from tests.backends.hubs import serving
-from tests.daemon.test_ether_daemon import AIR
+from tests.daemon.ether import AIR
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"

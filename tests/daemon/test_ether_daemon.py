@@ -5,15 +5,15 @@ import time
 import pytest
 
 from backends import RadioParams
-from backends.ether import protocol
+from backends.testing import protocol
 from sdrlinkd.adapters import BuiltInRobot, due_messages
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.process import Process, module
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
 from tests.backends.hubs import RawRadio, ask, serving
+from tests.daemon.ether import AIR
 from tests.waiting import wait_for
 
-AIR = {"rate_hz": 1e6, "frequency_hz": 2.45e9, "block_s": 0.001}
 BLOCK_S = AIR["block_s"]
 HASTY = "import backends.ether.radio as radio; radio.ANSWER_MS = 100; "
 

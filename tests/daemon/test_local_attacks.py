@@ -10,8 +10,8 @@ import time
 import pytest
 import zmq
 
-from sdrlinkd.client import ControlClient, NoDaemonError, Publisher, endpoint, paths
-from sdrlinkd.client.paths import IN_SOCKET
+from sdrlinkd.client import IN_SOCKET, ControlClient, NoDaemonError, Publisher, endpoint
+from sdrlinkd.client.testing import is_prepared
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
@@ -68,16 +68,16 @@ def test_clients_do_not_talk_to_a_folder_that_another_user_prepared(tmp_path, mo
     folder = tmp_path / "open" / "sdrlinkd-0"
     folder.mkdir(parents=True)
     folder.parent.chmod(0o1777)
-    assert not paths.is_prepared(folder)
-    monkeypatch.setattr(paths.os, "getuid", lambda: 12345)
+    assert not is_prepared(folder)
+    monkeypatch.setattr(os, "getuid", lambda: 12345)
     os.chown(folder, 54321, 54321)
-    assert paths.is_prepared(folder)
+    assert is_prepared(folder)
     (folder / "ctl.sock").touch()
     with pytest.raises(NoDaemonError, match="belongs to another user"):
         ControlClient(folder)
     # Root's folders are as safe as root.
     os.chown(folder, 0, 0)
-    assert not paths.is_prepared(folder)
+    assert not is_prepared(folder)
 
 
 @pytest.mark.parametrize("path", ["/dev/zero", "/", "/dev/null/x"])

@@ -4,8 +4,7 @@ import tomllib
 
 import pytest
 
-from sdrlinkd.demo.links import Options, write_config
-from sdrlinkd.demo.source import open_source
+from sdrlinkd.demo import Options, open_source, write_config
 
 RESTS = 1.25
 """Time for which an entry id is not reused, in reassembly timeouts."""

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from sdrlinkd.demo import Options, find_rate, open_source
-from sdrlinkd.demo.load import LoadOf
-from sdrlinkd.demo.rate import Tried, tried_out
+from sdrlinkd.demo.testing import LoadOf, Tried, tried_out
 from sdrlinkd.process import Process
 from tests.waiting import wait_for
 

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from sdrlinkd.demo.links import Options
-from sdrlinkd.demo.report import latency_ms, run_result, topic_results
-from sdrlinkd.demo.source import open_source
-from sdrlinkd.demo.trace import Sample, Trace, goodput_bytes_per_s, path_error_m
+from sdrlinkd.demo import Options, Sample, Trace, latency_ms, open_source
+from sdrlinkd.demo.testing import goodput_bytes_per_s, path_error_m, run_result, topic_results
 from sdrlinkd.errors import RegistryError, UserError
 from tests.adapters.recordings import STORAGES, ros2_bag
 

@@ -4,7 +4,7 @@ import pytest
 from msgspec.structs import replace
 
 from sdrlinkd.demo import RunResult, is_good, verdict
-from sdrlinkd.demo.report import PhyResult
+from sdrlinkd.demo.testing import PhyResult
 
 HEARD = PhyResult(
     mcs="QPSK 1/2", mcs_index=1, rate_hz=5e6, channel="awgn", snr_db=15.0, clock_ppm=10.0,

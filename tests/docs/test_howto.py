@@ -38,7 +38,6 @@ def reader(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", TYPED)
 def test_commands_work_and_show_what_is_printed(reader, name):
     text = (FOLDER / f"{name}.md").read_text()

@@ -64,9 +64,8 @@ def test_the_readme_fits_and_says_what_does_not_work():
         assert word.lower() in text.lower(), word
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.realtime
-@pytest.mark.timeout(400)
 def test_the_readme():
     """In the checkout itself: these are its first two commands."""
     for command in commands_of(text_of("README.md")):
@@ -79,16 +78,14 @@ def test_the_readme():
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_the_ether(reader):
     typist = reader()
     for command in commands_of(text_of("backends/ether/README.md")):
         typist.see(command)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.realtime
-@pytest.mark.timeout(600)
 @pytest.mark.skipif(bool(missing()), reason=missing())
 def test_the_test_radio(reader, tmp_path):
     typist = reader(
@@ -102,8 +99,7 @@ def test_the_test_radio(reader, tmp_path):
         typist.close()
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(400)
+@pytest.mark.long
 def test_the_tutorial_of_two_laptops(reader):
     """Both laptops are this one; what one prints for the other is copied."""
     free_hub = free_hub_port().name

@@ -17,8 +17,7 @@ MAY_SAY_NO = ("sdrlinkctl doctor", "sdrlinkctl status", "sdrlinkctl plan")
 
 pytestmark = [
     pytest.mark.skipif(bool(missing()), reason=missing()),
-    pytest.mark.slow,
-    pytest.mark.timeout(900),
+    pytest.mark.long,
 ]
 
 

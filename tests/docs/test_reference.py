@@ -12,8 +12,7 @@ from sdrlinkd.__main__ import make_parser
 from sdrlinkd.cli.app import run
 from sdrlinkd.config import Config
 from sdrlinkd.link import RX_PDU_REASONS, RX_REASONS, TX_REASONS
-from sdrlinkd.manual import find_key, key_names, sections
-from sdrlinkd.manual.attributes import field_texts
+from sdrlinkd.manual import field_texts, find_key, key_names, sections
 from sdrlinkd.reports import Snapshot
 from tests.docs.pages import ROOT
 from tests.machine import lacks
@@ -71,6 +70,7 @@ def test_the_page_of_benchmarks_is_that_of_what_is_kept():
     assert benchmarks_page.PAGE.read_text() == benchmarks_page.page(), "`make figures` writes it"
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn_of_what_is_kept(tmp_path, monkeypatch):
     for module in ("latency.pictures", "pound.pictures", "timesync.pictures", "phy_curves"):
         monkeypatch.setattr(f"benchmarks.{module}.FIGURES", tmp_path)
@@ -96,6 +96,7 @@ def printed(capsys, *words):
     return " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.slow
 def test_help_shows_keys_sections_pages_names_and_commands(capsys):
     assert "late-joiners" in printed(capsys)
     assert 'Takes one of "auction", "auto"' in printed(capsys, "access.policy")

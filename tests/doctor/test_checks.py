@@ -103,6 +103,7 @@ def test_what_the_environment_lacks(tmp_path):
         tmp_path, ["zfec>=1.5", "numpy>=1.26"], {"numpy": "1.9"}, None, Path("/elsewhere")
     )
     assert found["packages"].told == "zfec is missing, numpy 1.9 is older than 1.26"
+    assert found["packages"].to_do.endswith(" -m pip install 'zfec>=1.5' 'numpy>=1.26'")
     assert found["modem's package"].state is BAD
     assert "sdrlinkctl phy compile" in found["compiled modem"].to_do
 

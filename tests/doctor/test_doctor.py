@@ -11,6 +11,7 @@ from sdrlinkd.cli import run
 from sdrlinkd.config import ModemParams
 from sdrlinkd.doctor import Headroom, headroom_found, measure_headroom
 from sdrlinkd.errors import UserError
+from sdrlinkd.process import Process
 from tests.soapy_loopback import missing, module_folder
 
 SOAPY = (
@@ -130,7 +131,7 @@ def test_a_daemon_that_does_not_start_is_a_finding(monkeypatch):
     def fail(*_):
         raise UserError("the daemon did not start:\nno room")
 
-    monkeypatch.setattr("sdrlinkd.doctor.headroom.measure_headroom", fail)
+    monkeypatch.setattr(Process, "start", fail)
     found = headroom_found(ModemParams(), 1024, 1.0)
     assert (found.state, "no room" in found.told) == ("bad", True)
 

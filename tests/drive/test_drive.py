@@ -25,7 +25,7 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.reports import ReceivedTopicReport, VerdictReport
 from tests.laws import law
 from tests.reported import neighbor, snapshot, topic
-from tests.web.test_map import ODOMETRY, odometry
+from tests.web.odometry import ODOMETRY, odometry
 
 SECOND_NS = 1_000_000_000
 BEGIN_NS = 1_800_000_000 * SECOND_NS
@@ -154,6 +154,7 @@ def test_the_file_is_mcap_with_schemas(tmp_path):
     assert set(json.loads(message.data)) == set(json.loads(schema.data)["properties"])
 
 
+@pytest.mark.slow
 def test_the_page_has_everything_and_names_are_text(tmp_path):
     reports = [
         report(second, level="DEGRADED", reason=f"robot 2 hears us at {second} dB", name=HOSTILE)

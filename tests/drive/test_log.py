@@ -10,7 +10,7 @@ from sdrlinkd.errors import UserError
 from tests.pairs import pair
 from tests.programs import sdrlinkctl
 from tests.waiting import wait_for
-from tests.web.test_map import odometry
+from tests.web.odometry import odometry
 
 pytestmark = pytest.mark.slow
 

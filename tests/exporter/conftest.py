@@ -10,9 +10,12 @@ from urllib.parse import quote
 
 import pytest
 
+from tests.conftest import ETC
 from tests.programs import sdrlinkctl
 from tests.waiting import wait_for
 
+RULES = ETC / "prometheus/sdrlink.rules.yml"
+"""The shipped alerts."""
 STARTING = 503
 
 

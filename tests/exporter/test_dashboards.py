@@ -12,8 +12,8 @@ import pytest
 
 from docs.site.dashboards import FOLDER, files
 from sdrlinkd.client import Publisher
+from tests.exporter.conftest import RULES
 from tests.exporter.grafana import mistakes, queries
-from tests.exporter.test_exporter import RULES
 from tests.machine import lacks
 from tests.pairs import pair
 from tests.waiting import wait_for

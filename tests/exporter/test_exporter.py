@@ -17,11 +17,12 @@ from prometheus_client.openmetrics.parser import text_string_to_metric_families
 from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher
 from sdrlinkd.exporter import Collector, families, plain, samples
+from sdrlinkd.extras import hint
 from sdrlinkd.reports import TopicReport
+from tests.exporter.conftest import RULES
 from tests.machine import lacks
 from tests.waiting import wait_for
 
-RULES = Path(__file__).parents[2] / "etc/prometheus/sdrlink.rules.yml"
 STATE = "sdrlink_verdict_level"
 CLOCK = "sdrlink_neighbor_clock_state"
 needs_prometheus = pytest.mark.skipif(shutil.which("promtool") is None, reason=lacks("prometheus"))
@@ -153,7 +154,7 @@ def test_an_address_that_is_none_and_a_missing_library_are_one_sentence(monkeypa
     assert 'got "nonsense"; allowed: HOST:PORT' in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "prometheus_client", None)
     assert run(["exporter"]) == 2
-    assert "pip install 'sdrlinkd[metrics]'" in capsys.readouterr().err
+    assert hint("metrics") in capsys.readouterr().err
 
 
 @needs_prometheus

@@ -9,8 +9,7 @@ import pytest
 from benchmarks.fleet.field import GUARD
 from benchmarks.fleet.pdu_air import PduAir
 from sdrlinkd.client import NoDaemonError, Publisher, RefusedError, Subscriber
-from sdrlinkd.fleet import GatewayReport, encode
-from sdrlinkd.fleet.formats import Passed
+from sdrlinkd.fleet import GatewayReport, Passed, encode
 from sdrlinkd.process import Process, module
 from tests.fleet.conftest import Router
 from tests.waiting import wait_for
@@ -162,6 +161,7 @@ def test_two_airs_are_one_team(islands):
     assert reports[9].up_taken == 50 + reports[9].up["up_bridged"]
 
 
+@pytest.mark.long
 def test_another_gateway_takes_over_and_the_last_map_comes_late(islands):
     islands.start(["odom", "map"], '[topic.map]\ndurability = "transient_local"\n')
     islands.publish(1, "map", 3)
@@ -176,6 +176,7 @@ def test_another_gateway_takes_over_and_the_last_map_comes_late(islands):
     assert adds_up(islands.report(9))
 
 
+@pytest.mark.long
 def test_a_daemon_that_starts_again_learns_the_topics_again(islands):
     islands.start(["odom"])
     daemon = islands.daemons[8]
@@ -196,6 +197,7 @@ def test_a_daemon_that_starts_again_learns_the_topics_again(islands):
     assert all(adds_up(islands.report(gateway)) for gateway in GATEWAYS)
 
 
+@pytest.mark.long
 def test_a_robot_that_comes_over_is_not_sent_any_more(islands):
     islands.start(["*"])
     with Hearing(islands.daemons[4]) as far:

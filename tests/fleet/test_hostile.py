@@ -9,15 +9,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.calls import Service, told
-from sdrlinkd.fleet import encode, read_passed
-from sdrlinkd.fleet.bridge import MOST_WAITING, Bridge
-from sdrlinkd.fleet.formats import Passed
-from sdrlinkd.fleet.keys import Keys
-from sdrlinkd.fleet.report import BRIDGE, Counts
-from sdrlinkd.fleet.ros.attachment import Attachment
-from sdrlinkd.fleet.ros.calls import MOST_ASKED, MOST_RESULTS, Calls
-from sdrlinkd.fleet.ros.names import Node, Qos, Role, read_data_key, read_endpoint, robot_in
-from sdrlinkd.fleet.samples import Question, Sample
+from sdrlinkd.fleet import Keys, Passed, encode, read_passed
+from sdrlinkd.fleet.testing import (
+    BRIDGE,
+    MOST_ASKED,
+    MOST_RESULTS,
+    MOST_WAITING,
+    Attachment,
+    Bridge,
+    Calls,
+    Counts,
+    Node,
+    Qos,
+    Question,
+    Role,
+    Sample,
+    read_data_key,
+    read_endpoint,
+    robot_in,
+)
 
 KIND, HASH = "std_msgs::msg::dds_::String_", f"RIHS01_{'0a' * 32}"
 KEYS = Keys("mine")

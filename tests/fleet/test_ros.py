@@ -14,8 +14,7 @@ from zenoh_ros2_sdk.session import ZenohSession
 
 from sdrlinkd.adapters import definition, empty, to_cdr, type_hash
 from sdrlinkd.client import Publisher, Subscriber
-from sdrlinkd.fleet.ros.attachment import Attachment
-from sdrlinkd.fleet.ros.names import Node, Qos, Role, gid, read_data_key, read_endpoint
+from sdrlinkd.fleet.testing import Attachment, Node, Qos, Role, gid, read_data_key, read_endpoint
 from tests.fleet.conftest import FIRST, ROBOT, SECOND
 from tests.waiting import wait_for
 

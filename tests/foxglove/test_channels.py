@@ -13,9 +13,14 @@ from foxglove.websocket import ServerListener
 
 from sdrlinkd.client import Message
 from sdrlinkd.errors import UserError
-from sdrlinkd.foxglove import channels, operators, server
-from sdrlinkd.foxglove.channels import ReceivedTopics
-from sdrlinkd.foxglove.scene import Scene
+from sdrlinkd.foxglove.testing import (
+    CONSTANTS,
+    Operators,
+    ReceivedTopics,
+    Scene,
+    SlowClients,
+    start_server,
+)
 from tests.cli.snapshots import SNAPSHOT
 from tests.foxglove.viewer import SUBPROTOCOL, Viewer
 
@@ -59,7 +64,7 @@ def subscriptions():
 @pytest.fixture
 def url(context, subscriptions):
     """The address of a server."""
-    started = server.start_server("127.0.0.1", 0, context, subscriptions)
+    started = start_server("127.0.0.1", 0, context, subscriptions)
     yield f"ws://127.0.0.1:{started.port}"
     started.stop()
 
@@ -85,7 +90,7 @@ def test_names_and_types_from_the_air_are_only_text(context, url, subscriptions)
 
 
 def test_endless_new_names_fill_nothing(context, monkeypatch, caplog):
-    monkeypatch.setattr(channels, "MOST_CHANNELS", 5)
+    monkeypatch.setattr(*CONSTANTS["most_channels"], 5)
     topics = ReceivedTopics(context)
     for number in range(20):
         topics.take(message(f"/rx_robot_1/{number}"))
@@ -110,8 +115,8 @@ def test_last_messages_are_kept_within_bounds(context, monkeypatch):
         def close(self):
             pass
 
-    monkeypatch.setattr(channels, "Channel", Channel)
-    monkeypatch.setattr(channels, "MOST_KEPT_BYTES", 1000)
+    monkeypatch.setattr(*CONSTANTS["channel"], Channel)
+    monkeypatch.setattr(*CONSTANTS["most_kept_bytes"], 1000)
     topics = ReceivedTopics(context)
     for size in (600, 300, 500, 1001, 200):
         topics.take(message("/a", payload=bytes(size)))
@@ -135,7 +140,7 @@ def test_a_slow_client_loses_the_oldest_and_holds_nobody_up(context, url, subscr
     topics, n = ReceivedTopics(context), 20_000
     topics.take(message())
     with (
-        closing(server.SlowClients()) as slow,
+        closing(SlowClients()) as slow,
         Viewer(url, "*") as quick,
         socket.create_connection(_address(url)) as stuck,
     ):
@@ -189,7 +194,7 @@ async def test_of_a_flood_of_commands_the_newest_counts():
     async def publish(_, name, cdr, *__, **___):
         sent.append((name, cdr))
 
-    taker = operators.Operators(patterns, lambda *each: said.append(each), publish, print)
+    taker = Operators(patterns, lambda *each: said.append(each), publish, print)
     client = type("Client", (), {"id": 1})
     for number, topic in enumerate(("/robot_2/cmd_vel", "/robot_2/led", "/robot_3/cmd_vel")):
         shape = {"id": number, "topic": topic, "schema_name": "a/B", "encoding": "cdr"}
@@ -213,4 +218,4 @@ async def test_of_a_flood_of_commands_the_newest_counts():
 def test_an_address_that_is_taken_or_wrong_is_one_sentence(context, url):
     port = _address(url)[1]
     with pytest.raises(UserError, match=f"--listen 127.0.0.1:{port}: Address already in use"):
-        server.start_server("127.0.0.1", port, context, Subscriptions())
+        start_server("127.0.0.1", port, context, Subscriptions())

@@ -10,6 +10,7 @@ from docs.site import foxglove_layout
 from sdrlinkd.adapters import Fix, Place, cdr_from_fields, read_place
 from sdrlinkd.cli import run
 from sdrlinkd.cli.bridge import meanings
+from sdrlinkd.extras import hint
 from sdrlinkd.foxglove import BridgeReport, json_schema, judge
 from sdrlinkd.reports import Snapshot
 
@@ -115,7 +116,7 @@ def test_a_missing_sdk_and_a_bad_address_are_one_sentence(monkeypatch, capsys):
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "foxglove", None)
     assert run(["bridge", "foxglove"]) == 2
-    assert "pip install 'sdrlinkd[foxglove]'" in capsys.readouterr().err
+    assert hint("foxglove") in capsys.readouterr().err
 
 
 def test_the_command_says_who_may_see_and_send():

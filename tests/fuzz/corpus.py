@@ -6,10 +6,10 @@ from random import Random
 
 import numpy as np
 
-from backends.ether import protocol
+from backends.testing import protocol
 from sdrlinkd.link import ClockParams, Outcome, RepeatParams
-from sdrlinkd.pdulink.gnuradio import pmt
-from sdrlinkd.pdulink.gnuradio.pdus import to_gnu_radio
+from sdrlinkd.pdulink import to_gnu_radio
+from sdrlinkd.pdulink.testing import pmt
 from sdrlinkd.wire import build_records
 from tests.fuzz.mutate import RECORDS, Source, one_pdu
 from tests.fuzz.targets import PDU_SIZE

@@ -8,15 +8,15 @@ from random import Random
 
 import msgspec
 
-from backends import BackendError
-from backends.ether import protocol
-from backends.recording import describe
-from sdrlinkd.bus import envelope
+from backends import BackendError, describe
+from backends.testing import protocol
+from sdrlinkd.bus import fields_of
+from sdrlinkd.bus.testing import decode, wanted_of
 from sdrlinkd.config import parse_config
 from sdrlinkd.errors import ConfigError, EnvelopeError, PduError
 from sdrlinkd.link import ClockParams, Outcome, RelayParams, RepeatParams
-from sdrlinkd.pdulink.gnuradio import pmt
-from sdrlinkd.pdulink.gnuradio.pdus import from_gnu_radio
+from sdrlinkd.pdulink import from_gnu_radio
+from sdrlinkd.pdulink.testing import pmt
 from sdrlinkd.sealing import Key, Remembered, Sealing, SecurityParams
 from sdrlinkd.wire import (
     MIN_PDU_SIZE,
@@ -117,7 +117,7 @@ class Opening:
 def bus(data: bytes) -> None:
     """Frames of the bus, divided by the octet 0xFF."""
     frames = data.split(b"\xff")
-    for read in (envelope.decode, envelope.wanted_of, envelope.fields_of):
+    for read in (decode, wanted_of, fields_of):
         try:
             read(frames)
         except EnvelopeError:

@@ -12,6 +12,7 @@ from backends import Channel, IqFileRadio, Tuning, describe
 from phy import PathParams
 from sdrlinkd.errors import UserError
 from sdrlinkd.iq import Capture, CaptureWish, IqRecording
+from sdrlinkd.iq.testing import CONSTANTS, BurstFinder
 from tests.iq.radios import FREQUENCY_HZ, BlockRadio, air, gap, pieces
 from tests.iq.recordings import RATE_HZ, write_bursts
 
@@ -148,7 +149,7 @@ async def test_while_it_runs_the_recording_reads_and_its_state_is_told(tmp_path)
 
 
 async def test_who_stops_twice_gets_the_bursts_found_so_far(tmp_path, monkeypatch):
-    monkeypatch.setattr("sdrlinkd.iq.keeper.LEAST", 1 << 40)
+    monkeypatch.setattr(*CONSTANTS["least"], 1 << 40)
     samples, _ = air([2000], 20_000)
 
     def watch(state):
@@ -212,7 +213,7 @@ async def test_a_fault_of_ours_is_raised_and_nothing_hangs(tmp_path, monkeypatch
     def fail(self, *_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("sdrlinkd.iq.finder.BurstFinder.look", fail)
+    monkeypatch.setattr(BurstFinder, "look", fail)
     samples, _ = air([2000], 60_000)
     with pytest.raises(ZeroDivisionError):
         await captured(BlockRadio(pieces(samples, 100), ends=False), wish(tmp_path / "rec"))

@@ -11,7 +11,7 @@ from backends import Channel, IqFileRadio, LoopbackRadio, RxBlock, Tuning, TxOut
 from phy import PathParams
 from sdrlinkd.errors import UserError
 from sdrlinkd.iq import Capture, CaptureWish, IqRecording, Replay, plan_replay
-from sdrlinkd.iq.replay import AHEAD_S, MOST_AHEAD
+from sdrlinkd.iq.testing import AHEAD_S, MOST_AHEAD
 from tests.backends.radios import record
 from tests.iq.radios import FREQUENCY_HZ, BlockRadio, air, pieces
 from tests.iq.recordings import RATE_HZ, write_bursts

@@ -6,7 +6,7 @@ import pytest
 from backends import GAP_LABEL, Annotation, RecordingWriter
 from sdrlinkd.errors import UserError
 from sdrlinkd.iq import IqRecording, plan_replay
-from sdrlinkd.iq.stretches import PAUSE, WINDOW
+from sdrlinkd.iq.testing import CONSTANTS, PAUSE, WINDOW
 from tests.iq.radios import air
 from tests.iq.recordings import RATE_HZ
 
@@ -31,7 +31,7 @@ def in_zeros(spans, n=20_000, level=0.25):
 @pytest.mark.parametrize("type_name", ["cf32_le", "ci16_le", "ci8"])
 @pytest.mark.parametrize("piece", [1 << 18, 32, 96])
 def test_bursts_in_noise_are_found_whole(tmp_path, monkeypatch, type_name, piece):
-    monkeypatch.setattr("sdrlinkd.iq.stretches.PIECE", piece)
+    monkeypatch.setattr(*CONSTANTS["piece"], piece)
     starts = [0, 4000, 5801, 17_000]
     samples, length = air(starts, 20_000)
     found = planned(tmp_path, samples, type_name=type_name).stretches

@@ -1,12 +1,14 @@
 """What sealing remembers: whole or not at all, for one process, on one machine."""
 
 import json
+import os
+from pathlib import Path
 
 import pytest
 
 from sdrlinkd.errors import UserError
 from sdrlinkd.keyring import KeyState, state_dir
-from sdrlinkd.keyring import state as state_module
+from sdrlinkd.keyring.testing import CONSTANTS
 from sdrlinkd.sealing import Key, Remembered
 
 KEY, NEXT = Key(0, bytes(range(32))), Key(1, bytes(range(32, 64)))
@@ -17,7 +19,7 @@ def machine(tmp_path, monkeypatch):
     """This machine's id, which can be changed."""
     path = tmp_path / "machine-id"
     path.write_text("one\n")
-    monkeypatch.setattr(state_module, "MACHINE_ID", path)
+    monkeypatch.setattr(*CONSTANTS["machine_id"], path)
     return path
 
 
@@ -110,9 +112,9 @@ def test_a_power_cut_leaves_the_old_or_the_new(kept, monkeypatch):
                 raise OSError(5, "power cut")
 
             if steps[n] == "fsync":
-                patch.setattr(state_module.os, "fsync", cut)
+                patch.setattr(os, "fsync", cut)
             else:
-                patch.setattr(state_module.Path, "replace", cut)
+                patch.setattr(Path, "replace", cut)
             with pytest.raises(OSError, match="power cut"):
                 KeyState(kept.directory, 1).save(Remembered({KEY.fingerprint: 99}))
         assert KeyState(kept.directory, 1).load([KEY]).floors == {KEY.fingerprint: 77}
@@ -128,7 +130,7 @@ def test_a_directory_that_cannot_be_written_is_named(tmp_path):
 def test_where_it_is(tmp_path, monkeypatch):
     monkeypatch.delenv("STATE_DIRECTORY", raising=False)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    etc = state_module.SYSTEM_CONFIG
+    etc = Path("/etc/sdrlinkd")
     assert state_dir("", None) == tmp_path / "sdrlinkd"
     assert str(state_dir("", etc / "sdrlinkd.toml")) == "/var/lib/sdrlinkd"
     assert str(state_dir("", etc / "north.toml")) == "/var/lib/sdrlinkd-north"

@@ -3,7 +3,7 @@
 import pytest
 
 from sdrlinkd.lab import load_scenario
-from sdrlinkd.lab.robots import open_sources, write_daemon_config
+from sdrlinkd.lab.testing import open_sources, write_daemon_config
 
 
 @pytest.fixture

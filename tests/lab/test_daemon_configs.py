@@ -5,7 +5,7 @@ import pytest
 from sdrlinkd.config import load_config, make_setup
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.lab import load_scenario
-from sdrlinkd.lab.robots import open_sources
+from sdrlinkd.lab.testing import open_sources
 from tests.adapters.recordings import STORAGES, ros2_bag
 from tests.lab.scenarios import SHIPPED, write_scenario
 

@@ -14,7 +14,7 @@ from sdrlinkd.lab import (
     pair_table,
     pictures,
 )
-from sdrlinkd.lab.over_time import BINS, ClassOverTime
+from sdrlinkd.lab.testing import BINS, ClassOverTime
 from tests.lab.reports import lost, pair, report, robot
 
 NOBODY_MOVES = Scenario(robot=[])

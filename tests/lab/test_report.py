@@ -7,8 +7,7 @@ import pytest
 
 from sdrlinkd.demo import Sample, Trace
 from sdrlinkd.lab import LabReport
-from sdrlinkd.lab.over_time import BINS, Clock, classes_over_time
-from sdrlinkd.lab.report import pair_result, robot_result
+from sdrlinkd.lab.testing import BINS, Clock, classes_over_time, pair_result, robot_result
 from sdrlinkd.reports import (
     BusReport,
     LinkReport,

@@ -4,8 +4,7 @@ import pytest
 
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.lab import load_scenario, shipped_scenarios
-from sdrlinkd.lab.robots import open_sources
-from sdrlinkd.lab.scenario import outages_of
+from sdrlinkd.lab.testing import open_sources, outages_of
 
 ONE = "[[robot]]\nid = 1\n"
 TWO = "[[robot]]\nid = 2\n"

@@ -126,6 +126,7 @@ def test_without_access_it_loses_what_samples_lose():
         assert by_bursts[pair][1] == pytest.approx(age_s, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("policy", "load"), [("minislot", 0.4), ("auction", 0.3), ("tdma", 0.4)])
 def test_with_access_it_delivers_as_samples_do(policy, load):
     by_samples, by_bursts, sent = two_senders(policy, load=load)
@@ -153,7 +154,7 @@ def small_messages(n, per_s, until_s, seed):
     return {node: poisson(node, per_s, 40, until_s, seed) for node in range(1, n + 1)}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_24_robots_with_tdma_for_ten_minutes():
     """The first robot announces the schedule.
 
@@ -249,6 +250,7 @@ def outcome(seed):
     return got(sim), counters, [each.bursts for each in sim.stations.values()]
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_and_another_does_not():
     assert outcome(1) == outcome(1)
     assert outcome(1) != outcome(2)

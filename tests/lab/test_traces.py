@@ -9,8 +9,7 @@ import pytest
 from backends import Outage
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab import load_scenario
-from sdrlinkd.lab.scenario import outages_of
-from sdrlinkd.lab.traces import read_outages
+from sdrlinkd.lab.testing import outages_of, read_outages
 from tests.lab.scenarios import SHIPPED
 
 SHIPYARD = "log_ax_high_ax_160mhz_6ghz_loc4_robot_control.jsonl"

@@ -1,5 +1,7 @@
 """An air of bursts and pulses, for the policy `auction`: each burst tells what comes next."""
 
+from itertools import takewhile
+
 from sdrlinkd.link import Sensed
 from sdrlinkd.link.access import Waiting, make_auction, want_of
 from sdrlinkd.wire import Want
@@ -7,6 +9,8 @@ from tests.link.air import Air
 from tests.link.radios import DETECT_S, LOCKSTEP, params
 
 PULSE_S = 192 / 5e6
+ORDER_S = 0.05
+"""Pulses are kept in the order of decisions, which is that of their beginnings to within this."""
 FAST = LOCKSTEP._replace(pulse_s=PULSE_S)
 
 
@@ -54,8 +58,9 @@ class PulsingAir(Air):
 
     def sensed(self, node):
         carrier = super().sensed(node)
-        heard = [(begin, None) for begin in self.noise] + self.pulses
         after = node.true(carrier.idle_since)
+        recent = takewhile(lambda pulse: pulse[0] > after - ORDER_S, reversed(self.pulses))
+        heard = [*((begin, None) for begin in self.noise), *recent]
         known = sorted(
             node.clock(begin)
             for begin, src in heard

@@ -19,6 +19,7 @@ LONGEST_S = 0.004
 SHORT_S = 0.0005
 SETTLED_S = 1.5
 """Until then, robots do not know whether they have missed something."""
+MANY = pytest.param(24, marks=pytest.mark.long)
 
 
 def make_air(n, seed, **more):
@@ -43,7 +44,8 @@ def send_at_random(air, node, qos, until_s, per_s=20.0):
         air.offer(node, at, qos, SHORT_S)
 
 
-@pytest.mark.parametrize("n", [2, 3, 8, 24])
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [2, 3, 8, MANY])
 def test_bursts_never_overlap_whoever_sends_whatever(n):
     for seed in range(3):
         air = make_air(n, seed)
@@ -54,7 +56,7 @@ def test_bursts_never_overlap_whoever_sends_whatever(n):
         assert not any(node.waiting for node in air.nodes.values())
 
 
-@pytest.mark.parametrize("n", [2, 8, 24])
+@pytest.mark.parametrize("n", [2, 8, pytest.param(24, marks=pytest.mark.slow)])
 def test_a_quiet_hand_over_takes_two_mini_slots_and_all_have_the_same_share(n):
     air = make_air(n, 1)
     air.saturate(900 // n, qos=Qos.BULK)
@@ -67,7 +69,8 @@ def test_a_quiet_hand_over_takes_two_mini_slots_and_all_have_the_same_share(n):
     assert max(counts.values()) - min(counts.values()) <= 1
 
 
-@pytest.mark.parametrize("n", [3, 8, 24])
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [3, 8, MANY])
 @pytest.mark.parametrize(
     ("most", "one"),
     [
@@ -88,6 +91,7 @@ def test_what_is_more_urgent_waits_for_one_burst(n, most, one):
     assert air.bursts[-1].qos == most, "the others still had something"
 
 
+@pytest.mark.slow
 def test_several_urgent_ones_at_once_wait_for_each_other_only():
     n = 8
     air = make_air(n, 3)
@@ -103,7 +107,8 @@ def test_several_urgent_ones_at_once_wait_for_each_other_only():
     air.assert_nobody_clashes()
 
 
-@pytest.mark.parametrize("n", [3, 8, 24])
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [3, 8, MANY])
 @pytest.mark.parametrize("miss", [0.01, 0.1])
 def test_whoever_misses_a_burst_does_not_clash(n, miss):
     for seed in range(2):
@@ -117,6 +122,7 @@ def test_whoever_misses_a_burst_does_not_clash(n, miss):
         assert len({each.src for each in air.bursts if each.begin > SETTLED_S}) == n
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_s", [5, 50, 500])
 def test_foreign_energy_as_short_as_a_pulse_costs_air_and_silences_nobody(per_s):
     air = make_air(4, 5)
@@ -246,6 +252,7 @@ def test_a_pulse_that_does_not_leave_ends_our_part_in_the_contest():
         assert kinds == ([True, True, True, True, False] if has_left else [True])
 
 
+@pytest.mark.slow
 def test_a_mini_slot_that_was_missed_ends_our_part_too():
     """A host may stand still. The others then know nothing of our bit."""
     for seed in range(3):
@@ -263,6 +270,7 @@ def test_a_mini_slot_that_was_missed_ends_our_part_too():
         air.assert_nobody_clashes(SETTLED_S)
 
 
+@pytest.mark.slow
 def test_what_was_told_and_is_gone_is_not_sent_for_later():
     """Its robot was next, but had nothing. Later it has something again."""
     for seed in range(4):
@@ -277,6 +285,7 @@ def test_what_was_told_and_is_gone_is_not_sent_for_later():
         air.assert_nobody_clashes()
 
 
+@pytest.mark.slow
 def test_something_urgent_of_a_robot_with_bulk_waits_for_nobodys_default():
     """Its bulk was told, and nobody was silent for longer, so it is next; but others challenge."""
     n, until_s = 8, SETTLED_S + 10

@@ -13,7 +13,7 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Qos, Sensed
 from sdrlinkd.link.access import BACK_S, Waiting, Wish, make_access
 from sdrlinkd.wire import LAST_PLAN, Frame, Grant
-from tests.laws import law
+from tests.laws import law, one_in
 from tests.link.pulsing import FAST
 from tests.link.radios import params
 from tests.link.turns import tell, told_events
@@ -67,7 +67,7 @@ def changes(used):
     return sum(one[node] != two[node] for one, two in pairwise(used) for node in one)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_robot_that_goes_and_comes_back_is_reached_over_a_relay_meanwhile():
     track = [(0.0, NEAR), (5.0, NEAR), (8.0, FAR), (17.0, FAR), (20.0, NEAR)]
     team, used = drive(track, 27.0)
@@ -81,7 +81,7 @@ def test_a_robot_that_goes_and_comes_back_is_reached_over_a_relay_meanwhile():
     assert all(6.0 < at < 12.0 for at in lost_in(team, "u25", "u52", "u51"))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("relays", [True, False])
 def test_turns_by_request_from_the_start_where_some_do_not_hear_each_other(relays):
     team, used = drive([(0.0, FAR)], 13.0, seed=2, relays=relays)
@@ -95,7 +95,7 @@ def test_turns_by_request_from_the_start_where_some_do_not_hear_each_other(relay
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("relays", [True, False])
+@pytest.mark.parametrize("relays", one_in(2, [False, True]))
 def test_where_all_hear_all_losses_and_robots_that_leave_end_no_auction(relays):
     off = {3: [Outage(3.0, 5.5), Outage(7.0, 11.2)], 4: [Outage(4.0, 60.0)]}
     _, used = drive([(0.0, NEAR)], 15.0, seed=3, lost=0.05, relays=relays, off=off)

@@ -1,8 +1,7 @@
 """`grant`: nobody clashes, everybody has a turn in time, and the team finds another root."""
 
 from collections import defaultdict
-from functools import cache
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 from random import Random
 
 import pytest
@@ -30,11 +29,11 @@ from sdrlinkd.link.access import (
     want_of,
 )
 from sdrlinkd.wire import ANYBODY, Frame, Grant, Want, build_records
-from tests.laws import law
+from tests.laws import law, one_in
 from tests.link.radios import params
+from tests.link.schedules import FORMED_S, schedule_of
 from tests.link.turns import LONGEST_S, PDU_S, ROOM, STEP_S, TRAITS, Team, tell, told_events
 
-FORMED_S = 3.0
 TIMES = Times(Ticks(1e-4, 2e-4), PDU_S, 0.02, LONGEST_S, 3e-4, 5e-4)
 CHAIN = {(1, 2), (2, 3)}
 TUNNEL = {(1, 2), (2, 3), (3, 4), (4, 5)}
@@ -48,22 +47,14 @@ def saturated(n, seed, **more):
     return team
 
 
-@cache
-def schedule_of(nodes):
-    """What identifies the schedule of these robots, as their plans tell it."""
-    team = Team(list(nodes), 1)
-    team.run(FORMED_S)
-    return team.schedule
-
-
 def with_urgent(team, node, begin_s, end_s, per_s=10.0):
     at = begin_s
     while (at := at + team.rng.expovariate(per_s)) < end_s:
         team.robots[node].urgent_at.append(at)
 
 
-@pytest.mark.parametrize("n", [2, 3, 8, 12])
-@pytest.mark.parametrize("loss", [0.0, 0.2])
+@pytest.mark.slow
+@pytest.mark.parametrize(("n", "loss"), one_in(3, product([2, 3, 8, 12], [0.0, 0.2])))
 def test_nobody_clashes_and_the_air_is_used(n, loss):
     team = saturated(n, seed=n, loss=loss)
     team.run(FORMED_S + 2)
@@ -75,6 +66,7 @@ def test_nobody_clashes_and_the_air_is_used(n, loss):
         assert {each.src for each in team.bursts} == set(team.robots)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 5, 9])
 def test_whoever_has_something_urgent_waits_for_a_round_at_most(n):
     """All others have more bulk than the air carries."""
@@ -87,6 +79,7 @@ def test_whoever_has_something_urgent_waits_for_a_round_at_most(n):
     assert max(wait_s for _, _, wait_s in team.waits_s) <= round_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("links", [CHAIN, BRIDGE], ids=["chain", "bridge"])
 def test_robots_of_which_somebody_hears_both_never_send_at_once(links):
     nodes = {node for link in links for node in link}
@@ -101,6 +94,7 @@ def test_robots_of_which_somebody_hears_both_never_send_at_once(links):
         assert late == nodes
 
 
+@pytest.mark.slow
 def test_robots_that_are_three_hops_apart_send_at_once():
     far = {frozenset(pair) for pair in ((1, 4), (1, 5), (2, 5))}
     for seed in range(2):
@@ -159,6 +153,7 @@ def test_turns_at_once_are_of_robots_of_which_nobody_hears_both(turns, links, mo
             assert first[by] < first[node]
 
 
+@pytest.mark.slow
 def test_the_robot_in_the_middle_plans():
     for middle in (1, 2, 3):
         ends = [node for node in (1, 2, 3) if node != middle]
@@ -167,6 +162,7 @@ def test_the_robot_in_the_middle_plans():
         assert team.roots() == {middle}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", [0.0, 0.1])
 def test_when_the_root_dies_another_plans_within_three_rounds(loss):
     for seed in range(4):
@@ -186,6 +182,7 @@ def test_when_the_root_dies_another_plans_within_three_rounds(loss):
         assert {each.src for each in team.bursts if each.begin > died_s + 0.5} == {2, 3, 4, 5}
 
 
+@pytest.mark.slow
 def test_robots_join_without_a_clash_and_the_root_stays():
     for seed in range(4):
         team = saturated(4, seed, joins={1: 4.0, 3: 5.0})
@@ -206,6 +203,7 @@ def test_a_team_that_has_nothing_to_send_is_quiet():
     assert sum(each.src != 1 for each in late) < 4 * 4
 
 
+@pytest.mark.slow
 def test_two_teams_that_meet_become_one():
     for seed in range(3):
         apart = {(1, 3), (2, 4)}
@@ -362,6 +360,7 @@ def test_a_request_survives_the_air(waiting):
     assert waiting_of(want_of(3, waiting)._replace(air=0, lower_air=0)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("links", [None, {(1, node) for node in range(2, 13)} | {(2, 13)}])
 def test_a_plan_fits_into_the_room_that_each_pdu_has(links):
     """Also when all want the most, and expect something urgent at once."""
@@ -400,6 +399,7 @@ def test_requests_that_do_not_fit_beside_a_plan_wait_for_the_next_pdu():
     assert [each for records in told for each in records if isinstance(each, Want)] == wants
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("links", [None, CHAIN])
 def test_no_round_is_longer_than_the_longest(links):
     for n in (3, 8, 12) if links is None else (3,):
@@ -432,9 +432,11 @@ def test_where_a_burst_has_a_single_pdu_the_root_sends_too():
     assert min(air_s.values()) > 0.2 * 2
 
 
-@pytest.mark.parametrize("every_s", [0.001, 0.003, 0.01, 0.05])
-@pytest.mark.parametrize("node", [1, 2])
-@pytest.mark.parametrize("has_bulk", [False, True])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("node", "every_s", "has_bulk"),
+    one_in(5, product([1, 2], [0.001, 0.003, 0.01, 0.05], [False, True])),
+)
 def test_what_is_expected_starves_nobody(node, every_s, has_bulk):
     """Robot 3 may have bulk, robots 2 and 4 are quiet, and robot 5 may come at any time."""
     root = make_access(params("grant", [1, 2, 3, 4, 5]), 1, TRAITS, LONGEST_S, Random(1))

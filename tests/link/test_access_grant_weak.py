@@ -7,7 +7,7 @@ import pytest
 from sdrlinkd.link import RateParams
 from sdrlinkd.wire import ANYBODY, BROADCAST, Frame, Grant, PduBuilder, build_records, flags
 from tests.link.radios import params
-from tests.link.test_access_grant import schedule_of
+from tests.link.schedules import schedule_of
 from tests.link.turns import PDU_S, ROOM, TRAITS, Team
 from tests.link.world import make_link
 
@@ -28,6 +28,7 @@ def longest_silence_s(team, node, since_s):
     return max(after - before for before, after in pairwise([*begins, team.t]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_plans_that_are_read_by_luck_silence_nobody(seed):
     """Robot 1 would be the better root for robots 4 to 6, if only they heard its plans."""
@@ -37,6 +38,7 @@ def test_plans_that_are_read_by_luck_silence_nobody(seed):
         assert longest_silence_s(team, node, 6.0) < 0.5
 
 
+@pytest.mark.slow
 def test_a_root_that_is_gone_is_replaced_though_the_air_is_never_silent():
     """The others cannot read robots 4 and 5, and hear them all the time."""
     weak = [(a, b) for a in (2, 3) for b in (4, 5)]
@@ -64,6 +66,7 @@ def test_over_a_link_that_loses_some_bursts_a_team_forms_all_the_same():
     assert team.roots() == {1}
 
 
+@pytest.mark.slow
 def test_robots_that_no_path_leads_to_do_not_count():
     """LSAs of robots that have gone are kept for a while. The robot in the middle plans."""
     team = Team(range(1, 6), 1, links=[(1, 2), (2, 3), (4, 5)])

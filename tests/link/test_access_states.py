@@ -14,6 +14,7 @@ from sdrlinkd.link.access import (
     after,
     make_access,
 )
+from sdrlinkd.link.access.testing import AFTER
 from sdrlinkd.wire import Frame
 from tests.link.radios import LOCKSTEP, params
 
@@ -50,7 +51,7 @@ def taken(monkeypatch):
             found[policy].add((state, happens))
             return after(table, state, happens)
 
-        monkeypatch.setattr(f"sdrlinkd.link.access.{policy}.after", spy)
+        monkeypatch.setattr(*AFTER[policy], spy)
     return found
 
 

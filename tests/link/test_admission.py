@@ -144,6 +144,7 @@ def all_agree(air):
     return known[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", [0.0, 0.3])
 def test_over_two_hops_all_hear_the_same_word(loss):
     rng = Random(3)
@@ -196,6 +197,7 @@ def test_the_lowest_class_gives_way_and_comes_back():
     assert all_agree(air) == {(2, 0): True}
 
 
+@pytest.mark.slow
 def test_an_equal_newcomer_waits_and_a_planner_that_goes_leaves_the_word_behind():
     air = team(robots=(1, 2, 3), hears={(a, b) for a in (1, 2, 3) for b in (1, 2, 3) if a != b})
     air.run(2.0)
@@ -308,6 +310,7 @@ def test_with_share_0_nothing_is_told():
     assert not any(isinstance(record, Flows | Admit) for _, record in air.records(1))
 
 
+@pytest.mark.slow
 def test_without_reserved_topics_not_an_octet_is_told():
     air = team()
     air.run(6.0)
@@ -324,6 +327,7 @@ def test_a_beacon_does_not_replace_them(kind):
     assert waiting.holds(kind)
 
 
+@pytest.mark.slow
 def test_records_alone_take_little_air():
     robots = range(1, 9)
     air = team(robots=robots, hears={(a, b) for a in robots for b in robots if a != b})
@@ -332,7 +336,7 @@ def test_records_alone_take_little_air():
         reserve(air, robot, 0.1)
     air.run(5.0)
     began_s = air.now
-    air.run(air.now + 20.0)
+    air.run(air.now + 5.0)
     told = [
         pdu
         for at, _, burst in air.bursts
@@ -342,7 +346,7 @@ def test_records_alone_take_little_air():
     ]
     # Even if each had been sent for their sake alone.
     assert told
-    assert len(told) * PDU_S / 20.0 < 0.02
+    assert len(told) * PDU_S / 5.0 < 0.02
 
 
 # What cannot be true.
@@ -377,6 +381,7 @@ def test_what_cannot_be_true_is_ignored_and_counted(record):
     assert report.records_ignored == 1
 
 
+@pytest.mark.slow
 def test_flows_of_32_robots_are_held_at_most():
     air = team(robots=(1, 2), hears={(1, 2), (2, 1)})
     air.run(3.0)

@@ -50,6 +50,7 @@ def urgent_air_s(air, since):
     return used_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("has_bulk", [False, True])
 @pytest.mark.parametrize("chatty", [(0,), (0, 1, 2)])
 def test_in_an_auction_nobody_who_always_has_something_urgent_goes_twice_before_another(
@@ -73,6 +74,7 @@ def test_in_an_auction_nobody_who_always_has_something_urgent_goes_twice_before_
     assert max(waits) <= bound_s
 
 
+@pytest.mark.slow
 def test_in_an_auction_those_who_always_want_urgent_share_what_is_left():
     air, chatty = auction(6), (0, 2, 5)
     always(air, chatty, SETTLED_S, SETTLED_S + 3)
@@ -127,6 +129,7 @@ def turns_s(team, since):
     return used_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("root_too", [False, True])
 def test_with_turns_those_who_always_want_urgent_share_the_air(root_too):
     chatty = (1, 2, 4) if root_too else (2, 4, 5)
@@ -140,6 +143,7 @@ def test_with_turns_those_who_always_want_urgent_share_the_air(root_too):
     assert max(used_s[node] for node in chatty) < 1.3 * min(used_s[node] for node in chatty)
 
 
+@pytest.mark.slow
 def test_with_turns_an_urgent_message_now_and_then_goes_before_those_that_always_come():
     """It takes eight PDUs, so it does not fit a least turn. The others still have theirs."""
     team, one, n = team_of(6, (2, 4), FORMED_S, FORMED_S + 8), 6, 8
@@ -162,6 +166,7 @@ def named(access, now):
             if " has wanted urgent" in text}  # fmt: skip
 
 
+@pytest.mark.slow
 def test_in_an_auction_it_is_named_until_it_stops():
     air, end_s = auction(4), SETTLED_S + 12
     always(air, [2], SETTLED_S, end_s)
@@ -181,6 +186,7 @@ def test_in_an_auction_it_is_named_until_it_stops():
     assert named(access, end_s + 30) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("who", [1, 3])
 def test_with_turns_it_is_named_until_it_stops(who):
     """Robot 1 plans. It tells no requests, so the others do not know its own."""

@@ -30,6 +30,7 @@ from sdrlinkd.wire import (
     pieces,
 )
 from tests.laws import law
+from tests.link.declared import auto, run
 from tests.link.world import compose, make_link, received, rx, topic_of, tx
 from tests.wire.vectors import BY_NAME, HI, TOPIC
 
@@ -38,39 +39,9 @@ CDR = b"\0\1\0\0"
 HASH, OTHER_HASH = bytes(range(8)), bytes(range(1, 9))
 
 
-def auto(own_id=1, topics=(), **more):
-    return make_link(own_id, topics=topics, has_numbers=True, seed=own_id, **more)
-
-
 def name_of(link, message):
     """The name under which a message has arrived at `link`."""
     return link.heard_topic(message.src, message.series).name
-
-
-def step(links, now, lost=lambda: False):
-    """All links send and hear at `now`; returns (to, from, name, payload)."""
-    got = []
-    for link in links:
-        link.handle_timers(now)
-        while burst := compose(link, now, 8):
-            link.confirm(burst, Outcome.SENT, now)
-            for pdu in burst.pdus:
-                for other in links:
-                    if other is not link and not lost():
-                        got += [
-                            (
-                                other.own_id,
-                                m.src,
-                                other.heard_topic(m.src, m.series).name,
-                                m.payload,
-                            )
-                            for m in other.hear(pdu, now)
-                        ]
-    return got
-
-
-def run(links, begin, n, lost=lambda: False):
-    return [each for i in range(n) for each in step(links, begin + 0.05 * i, lost)]
 
 
 @pytest.mark.parametrize("pdu_size", [32, 64, 220, 1024])

@@ -169,6 +169,7 @@ def test_a_burst_that_leaves_late_is_joined_all_the_same():
     assert sender.audit() == receiver.audit() == []
 
 
+@pytest.mark.slow
 def test_the_largest_and_one_octet_more():
     sender, receiver = pair(32)
     most = max_large_size(32)
@@ -212,6 +213,7 @@ def test_any_octets_as_parts_are_dropped_or_joined(sent):
     assert rx(receiver).held == 0
 
 
+@pytest.mark.slow
 def test_between_two_parts_it_ends_with_no_entry_id():
     """A message that expires there has given its id back once."""
     sender, _ = pair()

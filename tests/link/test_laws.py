@@ -21,13 +21,8 @@ from sdrlinkd.link import (
 )
 from sdrlinkd.pdulink import Impairment
 from tests.laws import law
+from tests.link.books import assert_books_balance
 from tests.link.world import compose, make_link, rx, send_all, tx
-
-
-def assert_books_balance(link, seed):
-    ledger = tx(link)
-    assert link.audit() == [], f"seed {seed}"
-    assert ledger.queued == sum(ledger.queued_by_class.values())
 
 
 def any_policy(rng):
@@ -104,6 +99,7 @@ def test_the_ledger_holds_at_every_step_of_any_run(seed):
     assert tx(link).queued == tx(link).in_flight == 0
 
 
+@pytest.mark.slow
 @law(30)
 @given(st.integers(0, 2**32))
 def test_whatever_the_air_does_nothing_is_made_up(seed):

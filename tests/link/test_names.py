@@ -2,6 +2,8 @@
 
 from random import Random
 
+import pytest
+
 from sdrlinkd.client import MessageName
 from sdrlinkd.link import ClassesParams, DefaultParams, Overrides, Qos
 from tests.link.lossy import Air
@@ -37,6 +39,7 @@ class Named(Air):
                         assert a.matches(b) == b.matches(a) == (number_a == number_b), (a, b)
 
 
+@pytest.mark.slow
 def test_two_hearers_that_lose_different_pdus_name_messages_alike():
     both = 0
     for seed in range(3):

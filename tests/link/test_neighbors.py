@@ -1,9 +1,11 @@
 """How long a robot's usual pauses are, what is an outage, and of whom robots report."""
 
+import pytest
+
 from sdrlinkd.link import Overrides
 from sdrlinkd.link.receive import LONGEST_GAP_S, Neighbor
 from sdrlinkd.wire import LinkReport
-from tests.link.test_routes import mesh
+from tests.link.meshes import mesh
 from tests.link.world import compose, make_link, records_in
 
 
@@ -28,6 +30,7 @@ def test_an_outage_is_no_usual_pause():
     assert heard(neighbor, [400.0 + second for second in range(1, 120)]) < 3.0
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_heard_through_relays_only_is_not_reported():
     """Who plans the air takes it for a link, and would send plans over it."""
     air = mesh((1, 2), (2, 3), (1, 3))

@@ -6,7 +6,7 @@ import pytest
 
 from sdrlinkd.link import Overrides, Qos
 from sdrlinkd.wire import BROADCAST, LAST_PLAN, Frame, Grant, Want
-from tests.link.test_repeats_in_turns import ROUND_S, StandingTurns, in_turns
+from tests.link.standing_turns import ROUND_S, StandingTurns, in_turns
 
 
 class UnheardRequests(StandingTurns):

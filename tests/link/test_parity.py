@@ -115,6 +115,7 @@ def test_parity_of_a_message_that_is_complete_is_no_part_of_the_next():
         receiver.handle_timers(now)
 
 
+@pytest.mark.slow
 def test_memory_is_bounded_whatever_comes():
     receiver = protected(0.0, 2, pdu_size=2047, reassembly=ReassemblyParams(total_bytes=8 << 20))
     for src in range(3, 250):

@@ -3,7 +3,7 @@
 import pytest
 
 from sdrlinkd.link import ClockParams, PduLinkTraits
-from tests.link.test_routes import isolate, mesh
+from tests.link.meshes import isolate, mesh
 
 
 def share(air, robot, of):
@@ -45,6 +45,7 @@ def test_what_came_through_a_relay_only_was_lost_on_the_link():
     assert share(air, 1, of=2) < 0.7
 
 
+@pytest.mark.slow
 def test_lost_pdus_count_however_rarely_a_robot_is_heard():
     """Of a robot that says something once a second, every other PDU comes."""
     quiet = ClockParams(period_s=0.0)

@@ -85,6 +85,7 @@ def message(number, size=40):
     return b"\0\1\0\0" + number.to_bytes(4, "little") + bytes(size)
 
 
+@pytest.mark.slow
 @law(25)
 @given(
     st.integers(0, 1000), st.floats(0, 0.6), st.floats(0, 0.5), st.floats(0, 0.5),

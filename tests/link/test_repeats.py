@@ -229,6 +229,7 @@ def test_a_repeat_that_cannot_be_true_is_not_used():
     assert rx(link).control_bad == before + 3
 
 
+@pytest.mark.slow
 @law(40)
 @given(st.integers(0, 1000), st.floats(0, 0.3), st.sampled_from([40, 400]), st.booleans())
 def test_nothing_comes_twice_and_no_age_is_too_low(seed, loss, size, is_relayed):

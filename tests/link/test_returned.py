@@ -1,7 +1,5 @@
 """Late bursts are sent again: in order, with higher ages, and never lost silently."""
 
-import math
-
 import pytest
 
 from sdrlinkd.link import (
@@ -15,6 +13,7 @@ from sdrlinkd.link import (
 from sdrlinkd.link.access import Slot
 from sdrlinkd.link.transmit import GIVE_UP_S
 from sdrlinkd.wire import Beacon, Frame, Stamp, parse
+from tests.link.doorkeeper import Doorkeeper
 from tests.link.radios import LOCKSTEP, params
 from tests.link.world import PDU_S, airtime_s, make_link, next_burst, records_in, topic_of, tx, use
 
@@ -35,36 +34,6 @@ def without_ages(pdu):
 
 def stamps(burst):
     return [r.age_us for pdu in burst.pdus for r in records(pdu) if isinstance(r, Stamp)]
-
-
-class Doorkeeper:
-    """An access policy with preset answers, which records its calls."""
-
-    def __init__(self, *slots):
-        self.slots, self.told = list(slots), []
-
-    state = "kept"
-    pause_s = 0.0
-    others_follow = False
-    keeps_schedule = False
-    by_request = by_auction = None
-    tells_at = math.inf
-    needs_links = False
-
-    def know_links(self, edges):
-        pass
-
-    def slot(self, wish):
-        return self.slots.pop(0)
-
-    def sent(self, end, src):
-        self.told.append(("sent", end))
-
-    def not_sent(self, start):
-        self.told.append(("not sent", start))
-
-    def frame(self, start):
-        return None
 
 
 def test_it_goes_again_as_it_was_but_older():

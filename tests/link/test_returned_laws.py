@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sdrlinkd.link import Outcome, TopicPolicy
 from sdrlinkd.wire import parse
 from tests.laws import law
-from tests.link.test_laws import assert_books_balance
+from tests.link.books import assert_books_balance
 from tests.link.world import make_link, next_burst, rx, tx
 
 SIZE = 64

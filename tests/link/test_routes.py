@@ -7,46 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.link import ClockParams, Overrides, RelayParams
+from sdrlinkd.link import ClockParams, Overrides
 from sdrlinkd.link.routes import path, tree
 from sdrlinkd.wire import BROADCAST, Lsa, Need, Route, parse
 from tests.laws import law
-from tests.link.lossy import Air, carries
+from tests.link.lossy import carries
+from tests.link.meshes import AUTO, both, flows, isolate, mesh, of_others
 from tests.link.world import compose, make_link, rx, tell
 
-AUTO = RelayParams(policy="auto")
 DIAMOND = ((1, 2), (1, 3), (2, 4), (3, 4))
 PERIOD_S = 0.02
 
 
-def both(*pairs):
-    return {each for a, b in pairs for each in ((a, b), (b, a))}
-
-
-def mesh(*pairs, **kinds):
-    robots = sorted({robot for pair in pairs for robot in pair})
-    kinds = {"relay": AUTO, "hop_limit": 6, **kinds}
-    return Air(robots, hears=both(*pairs), **kinds)
-
-
-def flows(air, robot):
-    """Who forwards next, by source and destination."""
-    report = air.links[robot].report(air.now).routes
-    return {(flow.src, flow.dst): flow.forwarded_by for flow in report.flows if flow.forwarded_by}
-
-
-def isolate(air, robot):
-    """Let nobody hear a robot any more, nor the other way round."""
-    air.hears = {pair for pair in air.hears if robot not in pair}
-
-
-def of_others(air, robot):
-    """The PDUs that a robot forwarded."""
-    return [
-        pdu for _, src, burst in air.bursts if src == robot for pdu in burst.pdus if pdu[1] != robot
-    ]
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("dst", [4, BROADCAST])
 def test_a_chain_is_found_and_ages_stay_true(dst):
     air = mesh((1, 2), (2, 3), (3, 4))
@@ -63,6 +36,7 @@ def test_a_chain_is_found_and_ages_stay_true(dst):
     assert (1, BROADCAST) not in flows(air, 3)
 
 
+@pytest.mark.slow
 def test_where_all_hear_all_nothing_is_relayed_and_little_is_told():
     air = mesh(*combinations(range(1, 7), 2))
     air.run(3.0)
@@ -79,6 +53,7 @@ def test_where_all_hear_all_nothing_is_relayed_and_little_is_told():
         assert not any(isinstance(record, Route) for _, record in air.records(robot))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dst", [4, BROADCAST])
 @pytest.mark.parametrize("more", [(), ((2, 3),)])
 def test_a_relay_that_dies_is_gone_around_and_nothing_is_lost(dst, more):
@@ -104,6 +79,7 @@ def test_a_relay_that_dies_is_gone_around_and_nothing_is_lost(dst, more):
     assert flow.went_around == 1
 
 
+@pytest.mark.slow
 def test_a_relay_that_comes_back_is_used_if_it_is_needed():
     air = mesh((1, 2), (2, 3))
     air.run(2.5)
@@ -118,6 +94,7 @@ def test_a_relay_that_comes_back_is_used_if_it_is_needed():
     assert [n for n in air.numbers(3) if n >= 100] == list(range(100, 120))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dst", [3, BROADCAST])
 def test_the_only_relay_goes_on_though_its_answers_are_not_heard(dst):
     air = mesh((1, 2), (2, 3))
@@ -132,6 +109,7 @@ def test_the_only_relay_goes_on_though_its_answers_are_not_heard(dst):
     assert sorted(air.numbers(3)) == list(range(190))
 
 
+@pytest.mark.slow
 def test_a_far_robot_that_restarts_is_believed_though_its_numbers_begin_anew():
     air = mesh((1, 2), (2, 3))
     air.run(2.5)
@@ -187,6 +165,7 @@ def test_a_robot_that_is_not_named_forwards_nothing():
     assert two.audit() == []
 
 
+@pytest.mark.slow
 @law(40)
 @given(st.integers(0, 2**32))
 def test_in_any_mesh_everybody_gets_everything_once(seed):

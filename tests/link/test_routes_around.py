@@ -7,7 +7,7 @@ import pytest
 from sdrlinkd.link import Overrides
 from sdrlinkd.link.routes import Routes
 from sdrlinkd.wire import BROADCAST, DST, HOP, SEQ, SRC, Lsa
-from tests.link.test_routes import AUTO, flows, mesh
+from tests.link.meshes import AUTO, flows, mesh
 
 PERIOD_S = 0.02
 
@@ -16,6 +16,7 @@ def going_around(air):
     return {robot: link.report(air.now).routes.going_around for robot, link in air.links.items()}
 
 
+@pytest.mark.slow
 def test_nobody_is_gone_around_for_pdus_that_hold_only_records():
     """Nobody answers for these, so a relay must not wait for answers to them."""
     air = mesh((1, 2), (2, 3), (2, 4), (3, 5), (4, 6))
@@ -25,6 +26,7 @@ def test_nobody_is_gone_around_for_pdus_that_hold_only_records():
     assert any(pdu[1] == 1 for _, src, burst in air.bursts if src == 3 for pdu in burst.pdus)
 
 
+@pytest.mark.slow
 def test_a_detour_does_not_lead_back_to_the_source():
     """Robot 4 does not know that robot 1 goes around 2, and its own best path leads there."""
     air = mesh((1, 2), (2, 3), (1, 4), (4, 5), (5, 6), (6, 7), (7, 3))

@@ -11,7 +11,7 @@ from sdrlinkd.link.routes import Routes, cost_of
 from sdrlinkd.wire import BROADCAST, DST, HOP, MAX_LOSS, SEQ, SRC, Lsa, Route, share_of
 from tests.laws import law
 from tests.link.lossy import PDU_SIZE
-from tests.link.test_routes import AUTO, mesh, of_others
+from tests.link.meshes import AUTO, mesh, of_others
 from tests.link.world import compose, make_link, records_in, tell
 
 HOPS = 6

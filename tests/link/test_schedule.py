@@ -124,6 +124,7 @@ def test_what_nobody_can_foresee_shortens_bursts_and_what_is_alone_has_long_ones
     assert allow(forecasts, 2.0, max_burst_s=0.003).most == (100,) * 4
 
 
+@pytest.mark.slow
 @law(40)
 @given(st.integers(0, 2**32))
 def test_no_class_with_a_share_starves(seed):

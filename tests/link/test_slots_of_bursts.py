@@ -5,8 +5,8 @@ import pytest
 from sdrlinkd.link import Outcome, Overrides, Qos, RateParams
 from sdrlinkd.link.access import Slot
 from sdrlinkd.wire import Frame
+from tests.link.doorkeeper import Doorkeeper
 from tests.link.radios import LOCKSTEP, params
-from tests.link.test_returned import Doorkeeper
 from tests.link.world import make_link, most_pdus, next_burst, records_in, use
 
 SIZE = 64

@@ -10,7 +10,7 @@ from sdrlinkd.link import Offer
 from sdrlinkd.link.topics import LEASE_S, Demand, OwnTopics, Wants
 from sdrlinkd.wire import Registry, Wanted
 from tests.laws import law
-from tests.link.test_declared import auto, run, step
+from tests.link.declared import auto, run, step
 
 CDR = b"\0\1\0\0"
 

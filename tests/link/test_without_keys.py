@@ -153,6 +153,7 @@ def test_a_report_is_clamped_by_what_we_hear_ourselves():
     assert neighbors(team.links[1])[2].snr_there_db == pytest.approx(20.0 - 15.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_pretended_robots_do_not_silence_the_records_of_the_team():
     team = adaptive()
 

@@ -1,5 +1,6 @@
 """A team with the policy `grant` on an air of bursts, of which some are lost."""
 
+from bisect import bisect_right
 from itertools import islice
 from random import Random
 from typing import NamedTuple
@@ -42,6 +43,7 @@ class Robot:
         self.joins_at, self.pace = joins_at, 1 + 1e-6 * ppm
         self.is_on = True
         self.urgent_at = []
+        """When urgent messages of a PDU each come, in order."""
         self.bulk_s = 0.0
         self.beacon_at = 0.0
         self.free_at = 0.0
@@ -52,7 +54,7 @@ class Robot:
 
     def waiting(self, t):
         if self.urgent_at and self.urgent_at[0] <= t:
-            n = sum(at <= t for at in self.urgent_at)
+            n = bisect_right(self.urgent_at, t)
             return Waiting(Qos.URGENT, 64, t - self.urgent_at[0], n * PDU_S, self.bulk_s)
         return Waiting(Qos.BULK, 0, t, self.bulk_s) if self.bulk_s > 0 else None
 

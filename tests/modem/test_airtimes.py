@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 import phy
 from sdrlinkd.config import ModemParams
-from sdrlinkd.modem.airtimes import Airtimes
+from sdrlinkd.modem import Airtimes
 from tests.laws import law
 
 INFINITE = float("inf")

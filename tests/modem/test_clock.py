@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.modem.clock import BlockTimes, StreamClock
+from sdrlinkd.modem.testing import BlockTimes, StreamClock
 
 
 class Clock:

@@ -1,6 +1,6 @@
 """Radios of other packages: found by entry points, configured, made, and reported when broken."""
 
-import importlib
+import importlib.metadata
 import re
 import sys
 from pathlib import Path
@@ -12,7 +12,7 @@ from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.config import Config, make_setup, parse_config, typed_config
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.modem import access_words
-from tests.modem.test_modem_link import bursts, running, send
+from tests.modem.links import bursts, running, send
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "backends/README.md").read_text()

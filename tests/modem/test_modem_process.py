@@ -17,12 +17,10 @@ from sdrlinkd.config import Config
 from sdrlinkd.errors import LinkAbsentError, UserError
 from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem import make_modem
-from sdrlinkd.modem.clock import Seen
-from sdrlinkd.modem.process import life
-from sdrlinkd.modem.process.page import MOST_PULSES, Page, Shown
+from sdrlinkd.modem.testing import CONSTANTS, MOST_PULSES, Page, Seen, Shown
 from sdrlinkd.spawn import EarlyModem, spawn_modem
 from tests.laws import law
-from tests.modem.test_modem_link import Listener, bursts, config, send
+from tests.modem.links import Listener, bursts, config, send
 
 TIMES = st.floats(0, 1e9)
 
@@ -151,8 +149,8 @@ async def test_when_it_is_killed_all_bursts_are_settled_once_and_the_link_is_abs
 
 
 async def test_a_process_that_hangs_is_ended(monkeypatch):
-    monkeypatch.setattr(life, "HUNG_S", 0.5)
-    monkeypatch.setattr(life, "WATCH_S", 0.1)
+    monkeypatch.setattr(*CONSTANTS["hung_s"], 0.5)
+    monkeypatch.setattr(*CONSTANTS["watch_s"], 0.1)
     async with opened(config(paced=True)) as (modem, listener, task, spawned):
         send(modem, listener, list(bursts(7, 3)))
         await listener.until(lambda: len(listener.settled_bursts) == 3)

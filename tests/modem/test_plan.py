@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import GAP, TxWindows
-from sdrlinkd.modem.plan import AirPlan, TxWindowPlan
-from sdrlinkd.modem.process.load import LoadMeter
+from sdrlinkd.modem.testing import AirPlan, LoadMeter, TxWindowPlan
 
 
 def test_an_idle_air_takes_a_burst_after_the_lead():

@@ -9,8 +9,7 @@ import pytest
 import phy
 from backends import RxBlock
 from sdrlinkd.link import Sensed
-from sdrlinkd.modem.process.receiving import MAX_BLOCKS, ReceiverHere, ReceiverThread
-from sdrlinkd.modem.process.sensing_receiver import SensingReceiver
+from sdrlinkd.modem.testing import MAX_BLOCKS, ReceiverHere, ReceiverThread, SensingReceiver
 
 
 def make_receiving(senses=False):

@@ -8,7 +8,7 @@ import pytest
 import phy
 from backends import RxBlock
 from sdrlinkd.link import Sensed
-from sdrlinkd.modem.process.sensing_receiver import TAIL, VANISHED, SensingReceiver
+from sdrlinkd.modem.testing import TAIL, VANISHED, SensingReceiver
 
 RATE = 1e6
 WINDOW = phy.SENSE_WINDOW

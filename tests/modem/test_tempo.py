@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 
-from sdrlinkd.modem.tempo import OVERHEAD_S, Tempo
+from sdrlinkd.modem.testing import OVERHEAD_S, Tempo
 
 
 @pytest.mark.parametrize("per_sample_s", [5e-9, 2e-8, 1e-6])

@@ -9,8 +9,7 @@ import phy
 from backends import GAP, Capabilities, TxOutcome, TxReport
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Outcome
-from sdrlinkd.modem.modem import BurstOrder
-from sdrlinkd.modem.process.transmission import SHORT, Transmission
+from sdrlinkd.modem.testing import SHORT, BurstOrder, Transmission
 from sdrlinkd.wire import postponed
 from tests.wire.vectors import BY_NAME
 

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from sdrlinkd.modem.turns import INFINITE, Turns
+from sdrlinkd.modem.testing import INFINITE, Turns
 
 
 class Waits:

@@ -4,6 +4,7 @@ import contextlib
 import fcntl
 import os
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,15 +13,15 @@ import pytest
 from tests.packages.debian import ROOT, Debian, call, lacking
 
 GIVEN = "SDRLINK_DEB"
+WHEEL = (sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """All of them are slow, and the first waits until the package is built."""
+    """All of them are long: they build packages and whole systems."""
     here = Path(__file__).parent
     for item in items:
         if here in item.path.parents:
-            item.add_marker(pytest.mark.slow)
-            item.add_marker(pytest.mark.timeout(900))
+            item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(scope="session")
@@ -58,6 +59,18 @@ def once(
         user.unlink(missing_ok=True)
         if not list(parent.glob("systems-used-by-*")):
             shutil.rmtree(shared, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def wheels(once) -> tuple[Path, Path]:
+    """(the daemon's, the client's), as `make wheel` makes them but for the compiled modem."""
+
+    def build(folder: Path) -> None:
+        for project in (ROOT, ROOT / "etc/client"):
+            call(*WHEEL, folder, cwd=project)
+
+    folder = once("wheels", build)
+    return next(folder.glob("sdrlinkd-*.whl")), next(folder.glob("sdrlinkd_client-*.whl"))
 
 
 @pytest.fixture(scope="session")

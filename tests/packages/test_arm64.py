@@ -16,7 +16,6 @@ NUMPY = "--engine numpy --duration 1 --speed 0.01 --rate 2e4 --topics /cmd_vel"
 
 
 @pytest.mark.fresh
-@pytest.mark.timeout(7200)
 def test_the_package_for_64_bit_arm_installs_and_delivers_every_message(tmp_path):
     if why := lacking():
         pytest.skip(why)

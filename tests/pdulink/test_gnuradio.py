@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import UserError
-from sdrlinkd.pdulink.gnuradio import pmt
-from sdrlinkd.pdulink.gnuradio.pdus import from_gnu_radio, to_gnu_radio
-from sdrlinkd.pdulink.gnuradio.transport import TcpTransport, UdpTransport, ZmqTransport
+from sdrlinkd.pdulink import from_gnu_radio, to_gnu_radio
+from sdrlinkd.pdulink.testing import TcpTransport, UdpTransport, ZmqTransport, pmt
 
 SIZE = 64
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.pdulink.gnuradio import pmt
+from sdrlinkd.pdulink.testing import pmt
 from tests.pdulink.gnu_radio import PYTHON, no_gnu_radio
 
 GOLDEN = [

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from phy.estimation import in_planes, new_channel, new_scratch, tones
-from phy.kernels.training import estimate
+from phy.kernels import estimate
 from phy.reference import training
-from phy.tables.burst import DRIFT, GAIN, NO
+from phy.testing import DRIFT, in_planes, new_channel, new_scratch, tones
 from tests.phy.signals import noise
 
 
@@ -33,8 +32,8 @@ def assert_same(channel, other, grid, error=2e-4):
     """Assert that a kernel's channel equals the reference's."""
     power = other.gain + other.no
     assert gains_of(channel, grid) == pytest.approx(other.h, abs=error * np.sqrt(power))
-    assert channel.figures[NO] == pytest.approx(other.no, rel=2e-3)
-    assert channel.figures[GAIN] == pytest.approx(other.gain, rel=2e-3, abs=1e-6 * power)
+    assert channel.no == pytest.approx(other.no, rel=2e-3)
+    assert channel.gain == pytest.approx(other.gain, rel=2e-3, abs=1e-6 * power)
     assert channel.figures[DRIFT] == pytest.approx(other.drift, rel=0.02, abs=1e-5)
     assert channel.unknown == pytest.approx(other.unknown, rel=0.02, abs=0.01 * other.no)
     assert channel.power == pytest.approx(other.power, rel=0.01, abs=1e-3 * power)

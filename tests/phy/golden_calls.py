@@ -5,9 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from phy import compute, engine
-from phy.engine.entries import BLOCK, ENTRIES
-from phy.tables.block import FIELDS
+from phy import engine
+from phy.testing import BLOCK, ENTRIES, FIELDS, compute
 
 EXACT, NEAR_INT16, FLOAT32, FLOAT64, ADDRESSES = range(5)
 _KINDS = {"int16": NEAR_INT16, "float32": FLOAT32, "complex64": FLOAT32, "float64": FLOAT64}

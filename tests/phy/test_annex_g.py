@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from phy import OFDM_64_16, Modulation, compute
-from phy.interleaver import order
-from phy.mapping import mapping
-from phy.ofdm import to_tones
-from phy.preamble import BARKER, SEGMENT, SHORT, length, long_symbol, preamble, short_subcarriers
+from phy import OFDM_64_16, Modulation
+from phy.testing import compute, mapping, order, preamble, to_tones
 
 # The standard's samples include the inverse FFT's 1/64; ours have mean power 1.
 OURS = OFDM_64_16.scale
@@ -103,25 +100,25 @@ def test_the_signal_field_back_from_time():
 
 
 def test_the_long_training_symbol():
-    spectrum = np.fft.fft(long_symbol()) / OURS
+    spectrum = np.fft.fft(preamble.long_symbol()) / OURS
     assert spectrum == pytest.approx(subcarriers(LONG_CARRIERS), abs=1e-5)
-    assert long_symbol() == pytest.approx(mirrored(LONG_TIME), abs=ROUNDING)
+    assert preamble.long_symbol() == pytest.approx(mirrored(LONG_TIME), abs=ROUNDING)
 
 
 def test_the_short_training_is_the_standards_under_a_cover():
-    segments = preamble()[:SHORT].reshape(12, SEGMENT)
+    segments = preamble.preamble()[: preamble.SHORT].reshape(12, preamble.SEGMENT)
     assert segments[0] == pytest.approx(OURS * np.array(SHORT_TIME), abs=ROUNDING)
     signs = np.sum(segments[1:] * segments[:-1].conj(), axis=1).real
     assert np.array_equal(np.sign(signs), [1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1])
-    assert np.array_equal(np.sign(signs), BARKER)
-    values = short_subcarriers()[short_subcarriers() != 0]
+    assert np.array_equal(np.sign(signs), preamble.BARKER)
+    values = preamble.short_subcarriers()[preamble.short_subcarriers() != 0]
     assert np.abs(values.real) == pytest.approx(1.472, abs=5e-4)
 
 
 def test_the_preamble_is_short_training_a_guard_and_two_long_symbols_at_power_1():
-    samples = preamble()
-    assert len(samples) == length() == 352
-    long = long_symbol()
-    assert np.array_equal(samples[SHORT:], np.concatenate((long[32:], long, long)))
-    for part in (samples, samples[:SHORT], samples[SHORT:]):
+    samples = preamble.preamble()
+    assert len(samples) == preamble.length() == 352
+    long = preamble.long_symbol()
+    assert np.array_equal(samples[preamble.SHORT :], np.concatenate((long[32:], long, long)))
+    for part in (samples, samples[: preamble.SHORT], samples[preamble.SHORT :]):
         assert np.mean(np.abs(part) ** 2) == pytest.approx(1, abs=0.02)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from phy.kernels.argument_block import opener
-from phy.tables.block import ArgumentBlock, block_of
+from phy.kernels import opener
+from phy.testing import ArgumentBlock, block_of
 
 
 @block_of("i8 f8 f4[1] c8[2] i2[3]")

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from phy import COUNTERS, OFDM_64_16, Receiver, Transmitter, layout, preamble
-from phy.header import BurstHeader
-from phy.transmitter import header_samples
+from phy import COUNTERS, OFDM_64_16, Receiver, Transmitter, layout
+from phy.testing import BurstHeader, header_samples, preamble
 from tests.phy.signals import (
     endings,
     hear,

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import j0
 
-from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
-from phy.channel.fading import BLOCK, jakes, moving_filter
-from phy.channel.resampling import N_TAPS, echo_filters, stretch
+from phy import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
+from phy.testing import FADING_BLOCK, N_TAPS, echo_filters, jakes, moving_filter, stretch
 from tests.laws import law
 from tests.phy.signals import noise, silence, turned
 
@@ -244,7 +243,7 @@ def test_moving_echoes_change_as_jakes_said():
 
 def test_a_filter_that_does_not_move_is_a_convolution():
     x, taps = noise(rng(), 1000), noise(rng(), 40)
-    moved = moving_filter(x, np.tile(taps, (-(-1000 // BLOCK), 1)))
+    moved = moving_filter(x, np.tile(taps, (-(-1000 // FADING_BLOCK), 1)))
     assert moved == pytest.approx(np.convolve(x, taps), abs=1e-4)
 
 

@@ -7,21 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phy.convolutional import (
-    HALF,
-    MAX_LLR,
-    THREE_QUARTERS,
-    TWO_THIRDS,
-    ViterbiWorkspace,
-    decode,
-    encode,
-)
 from phy.reference import viterbi
+from phy.testing import convolutional
 from tests.laws import law
 
 SEED = 11
+HALF, TWO_THIRDS = convolutional.HALF, convolutional.TWO_THIRDS
+THREE_QUARTERS, MAX_LLR = convolutional.THREE_QUARTERS, convolutional.MAX_LLR
+encode, decode = convolutional.encode, convolutional.decode
 RATES = (HALF, TWO_THIRDS, THREE_QUARTERS)
-WORK = ViterbiWorkspace(8 * 2051 + 6)
+WORK = convolutional.ViterbiWorkspace(8 * 2051 + 6)
 
 every_rate = pytest.mark.parametrize("code", RATES, ids=lambda code: code.name)
 
@@ -142,7 +137,7 @@ def test_a_block_that_seems_to_begin_in_another_state_is_still_decoded_from_stat
 
 def test_a_used_workspace_leaves_no_trace():
     rng = np.random.default_rng(SEED)
-    work = ViterbiWorkspace(8 * 60 + 6)
+    work = convolutional.ViterbiWorkspace(8 * 60 + 6)
     long = encode(random_blocks(rng, 1, 60), HALF)
     data = random_blocks(rng, 1, 5)
     decode(surely(long, MAX_LLR), 60, HALF, work)

@@ -3,17 +3,28 @@
 import numpy as np
 import pytest
 
-from phy import OFDM_64_16, Modulation, ofdm, points
-from phy.convolutional import MAX_LLR
-from phy.estimation import in_planes, new_channel, new_scratch, tones
-from phy.interleaver import order
-from phy.kernels.equaliser import BLOCK, equalise, start_tracking
-from phy.mapping import axes, mapping
-from phy.sequences import polarity
-from phy.tables.burst import GAIN, NO
+from phy import OFDM_64_16, Modulation, points
+from phy.kernels import equalise, start_tracking
+from phy.reference import equaliser
+from phy.testing import (
+    GAIN,
+    NO,
+    axes,
+    convolutional,
+    in_planes,
+    mapping,
+    new_channel,
+    new_scratch,
+    order,
+    polarity,
+    to_tones,
+    tones,
+)
 
 SEED = 17
 GRID = OFDM_64_16
+BLOCK = equaliser.BLOCK
+MAX_LLR = convolutional.MAX_LLR
 N_SYMBOLS = BLOCK  # After so many, the channel is corrected by what was decided.
 SCALE = 8  # LLRs are in eighths
 
@@ -70,7 +81,7 @@ def bins_of(coded, modulation, first_symbol):
     """Symbols as sent `[n, 64]`."""
     samples = mapping(modulation, GRID).to_samples(coded, first_symbol, np.inf)
     starts = np.arange(GRID.n_cp, len(samples), GRID.n_symbol)
-    y = ofdm.to_tones(samples, starts, 0.0, 0j, GRID)[:, :, : GRID.n_used]
+    y = to_tones(samples, starts, 0.0, 0j, GRID)[:, :, : GRID.n_used]
     bins = np.zeros((len(y), GRID.n_fft), np.complex64)
     bins[:, GRID.bins[GRID.tones]] = y[:, 0] + 1j * y[:, 1]
     return bins

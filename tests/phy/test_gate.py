@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from phy import Receiver, Transmitter, compute, preamble
-from phy.kernels.detector import DOUBLING, GATE
+from phy import Receiver, Transmitter
 from phy.reference import detection
-from phy.tables.detector import DC_IMAG, DC_REAL, FLOOR, HISTORY, new_search_memory
+from phy.testing import DC_IMAG, DC_REAL, FLOOR, HISTORY, compute, new_search_memory, preamble
 from tests.phy.signals import heard, noise, silence
 
 HOP = 512
@@ -67,7 +66,8 @@ def test_the_floor_follows_the_noise_to_another_level(factor):
     rng, gated = np.random.default_rng(SEED), Search()
     gated(hops(rng, 100, 0.04), threshold=1.0)
     assert gated.state[FLOOR] == pytest.approx(0.04, rel=0.05)
-    n = 400 + int(DOUBLING * max(0.0, math.log2(factor)))
+    # Above the floor, it doubles in 4096 hops.
+    n = 400 + int(4096 * max(0.0, math.log2(factor)))
     gated(hops(rng, n, 0.04 * factor), threshold=1.0)
     assert gated.state[FLOOR] == pytest.approx(0.04 * factor, rel=0.05)
 
@@ -101,4 +101,3 @@ def test_the_reference_opens_for_the_same_hops_and_knows_the_same_noise():
         part = x[at : at + HISTORY + HOP]
         assert (gated(part) < 0) == (plain.crossing(part, at) is None)
         assert gated.state[FLOOR] == pytest.approx(plain.noise, rel=1e-4)
-    assert detection.GATE == GATE

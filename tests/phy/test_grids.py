@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from phy import GRIDS, MCS_TABLE, Path, PathParams, Receiver, Transmitter, layout, preamble
+from phy import GRIDS, MCS_TABLE, Path, PathParams, Receiver, Transmitter, layout
+from phy.testing import preamble
 from tests.phy.signals import heard, noisy, payloads, silence, turned
 
 SEED = 59

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from numba import njit
 
-from phy import OFDM_64_16, Modulation, compute
-from phy.kernels.detector import detector_sums
-from phy.kernels.rotation import lean, lean_more
-from phy.mapping import mapping
-from phy.numerology import GRIDS
-from phy.preamble import preamble
+from phy import GRIDS, OFDM_64_16, Modulation, reference
+from phy.kernels import detector_sums, lean, lean_more
 from phy.reference import detection
-from phy.reference.mapping import to_subcarriers
-from phy.reference.ofdm import to_samples
-from phy.reference.smoothing import centred
-from phy.stream import SampleStream
-from phy.tables.detector import FORGETS, HISTORY, new_search_memory
+from phy.testing import (
+    FORGETS,
+    HISTORY,
+    SampleStream,
+    compute,
+    mapping,
+    new_search_memory,
+    preamble,
+)
 from tests.phy.signals import noise, silence, turned
 
 SEED = 47
@@ -35,7 +35,7 @@ def sums(x, dc, n):
 @pytest.mark.parametrize("dc", [0j, 0.3 - 0.2j])
 def test_the_detectors_sums_are_their_formula(n, dc):
     x = noise(rng(), HISTORY + n)
-    x[20 : 20 + 192] += preamble()[: len(x[20 : 20 + 192])]
+    x[20 : 20 + 192] += preamble.preamble()[: len(x[20 : 20 + 192])]
     p, e = sums(x, dc, n)
     wanted_p, wanted_e = detection.sums(x, dc)
     assert p == pytest.approx(wanted_p, abs=2e-4)
@@ -43,7 +43,7 @@ def test_the_detectors_sums_are_their_formula(n, dc):
 
 
 def test_the_metric_is_1_at_the_last_sample_of_the_short_training_and_nowhere_else():
-    x = np.concatenate((silence(HISTORY + 100), turned(preamble(), 0.02), silence(200)))
+    x = np.concatenate((silence(HISTORY + 100), turned(preamble.preamble(), 0.02), silence(200)))
     p, e = sums(x, 0j, len(x) - HISTORY)
     metric = np.abs(p) / np.where(e > 0, e, 1)
     assert metric.max() == pytest.approx(1, abs=1e-5)
@@ -65,7 +65,7 @@ def searched(x, threshold=0.25, hop=512, dc=(0.0, 0.0, 0.0, 0.0), excess=0.0, ag
 @pytest.mark.parametrize("lead", [HISTORY, 700, 703, 1500])
 def test_search_finds_the_first_sample_over_the_threshold(lead):
     x = 0.1 * noise(rng(), HISTORY + 5 * 512)
-    x[lead : lead + 352] += preamble()
+    x[lead : lead + 352] += preamble.preamble()
     found, _ = searched(x)
     p, e = sums(x, 0j, len(x) - HISTORY)
     assert found == HISTORY + int(np.argmax(np.abs(p) > 0.25 * e))
@@ -76,7 +76,7 @@ def test_a_raised_threshold_sinks_again():
     """A peak of about 0.6 every 2048 samples: the first one above the decayed threshold counts."""
     x = 0.75 * noise(rng(), HISTORY + 10 * 2048)
     for begin in range(300, len(x) - 352, 2048):
-        x[begin : begin + 352] += preamble()
+        x[begin : begin + 352] += preamble.preamble()
     p, e = sums(x, 0j, len(x) - HISTORY)
     level = 0.25 + 4 * np.exp(-(np.arange(len(p)) // 512 * 512 + 1000) / FORGETS)
     wanted = HISTORY + int(np.argmax(np.abs(p) > level * e))
@@ -107,9 +107,9 @@ def test_coded_bits_become_the_references_symbols(grid, modulation, n):
     """Interleaved, mapped, with pilots, prefix and clipped peaks."""
     by = mapping(modulation, grid)
     coded = rng().integers(0, 2, n * by.symbol_bits, np.uint8)
-    subcarriers = to_subcarriers(coded, modulation, grid, 7)
+    subcarriers = reference.mapping.to_subcarriers(coded, modulation, grid, 7)
     for peak in (np.inf, 1.5):
-        wanted = to_samples(subcarriers, grid, peak)
+        wanted = reference.ofdm.to_samples(subcarriers, grid, peak)
         assert by.to_samples(coded, 7, peak) == pytest.approx(wanted, abs=3e-6)
 
 
@@ -162,6 +162,7 @@ def test_leaning_more_adds_up(slope):
     for _ in range(100):
         _lean_more(slope, numbers, turns)
     lean(0.2 + 100 * slope, subcarriers, at_once)
-    wanted = centred(np.ones(52), -0.2 - 100 * slope, OFDM_64_16)[OFDM_64_16.tones]
-    assert at_once[0, :52] + 1j * at_once[1, :52] == pytest.approx(wanted, abs=1e-6)
+    wanted = reference.smoothing.centred(np.ones(52), -0.2 - 100 * slope, OFDM_64_16)
+    made = at_once[0, :52] + 1j * at_once[1, :52]
+    assert made == pytest.approx(wanted[OFDM_64_16.tones], abs=1e-6)
     assert turns[:, :52] == pytest.approx(at_once[:, :52], abs=2e-5)

@@ -4,16 +4,10 @@ import numpy as np
 import pytest
 from numba import njit
 
-from phy import Modulation, points
-from phy.kernels import lanes
-from phy.kernels.decisions import expected_level
-from phy.kernels.demapper import axis_llrs
-from phy.kernels.lanes import load, splat, store, store_int16
-from phy.numerology import GRIDS
-from phy.ofdm import to_tones
-from phy.reference import demapper as reference
-from phy.reference.ofdm import to_subcarriers
-from phy.sizes import N_LANES
+from phy import GRIDS, Modulation, points
+from phy.kernels import axis_llrs, expected_level, lanes
+from phy.reference import demapper, ofdm
+from phy.testing import N_LANES, to_tones
 from tests.phy.signals import noise
 
 SEED = 49
@@ -25,21 +19,21 @@ def rng():
 
 @njit
 def _operations(a, b, out):
-    x, y = load(a, 0), load(b, 0)
-    store(out, 0, x + y)
-    store(out, 8, x - y)
-    store(out, 16, x * y)
-    store(out, 24, x / y)
-    store(out, 32, -x)
-    store(out, 40, lanes.magnitude(x))
-    store(out, 48, lanes.with_sign(x, y))
-    store(out, 56, lanes.least(x, y))
-    store(out, 64, lanes.most(x, y))
-    store(out, 72, lanes.first_halves(x, y))
-    store(out, 80, lanes.second_halves(x, y))
-    store(out, 88, splat(b[3]))
-    store(out, 96, splat(lanes.total(x)))
-    store(out, 104, lanes.root(lanes.magnitude(x)))
+    x, y = lanes.load(a, 0), lanes.load(b, 0)
+    lanes.store(out, 0, x + y)
+    lanes.store(out, 8, x - y)
+    lanes.store(out, 16, x * y)
+    lanes.store(out, 24, x / y)
+    lanes.store(out, 32, -x)
+    lanes.store(out, 40, lanes.magnitude(x))
+    lanes.store(out, 48, lanes.with_sign(x, y))
+    lanes.store(out, 56, lanes.least(x, y))
+    lanes.store(out, 64, lanes.most(x, y))
+    lanes.store(out, 72, lanes.first_halves(x, y))
+    lanes.store(out, 80, lanes.second_halves(x, y))
+    lanes.store(out, 88, lanes.splat(b[3]))
+    lanes.store(out, 96, lanes.splat(lanes.total(x)))
+    lanes.store(out, 104, lanes.root(lanes.magnitude(x)))
 
 
 def test_every_operation_is_that_of_float32():
@@ -59,7 +53,7 @@ def test_every_operation_is_that_of_float32():
 
 @njit
 def _whole(a, out):
-    store_int16(out, 2, load(a, 1))
+    lanes.store_int16(out, 2, lanes.load(a, 1))
 
 
 def test_whole_numbers_are_cut_towards_zero():
@@ -76,7 +70,7 @@ def test_tones_are_those_of_the_references_fft(grid):
     for n in (1, 2, 7, 8, 9, 31):
         starts = np.sort(rng().integers(0, len(x) - grid.n_fft + 1, n))
         starts[-1] = len(x) - grid.n_fft
-        expected = to_subcarriers(x, starts, frequency, dc, grid, at)[:, grid.tones]
+        expected = ofdm.to_subcarriers(x, starts, frequency, dc, grid, at)[:, grid.tones]
         y = to_tones(x, starts, frequency, dc, grid, at)
         assert y[:, 0, : grid.n_used] + 1j * y[:, 1, : grid.n_used] == pytest.approx(
             expected, abs=2e-6
@@ -94,15 +88,15 @@ def test_a_window_is_the_same_alone_and_among_others():
 @njit
 def _llrs(level, weight, axis_bits, out):
     for d in range(0, level.size, N_LANES):
-        axis_llrs(load(level, d), load(weight, d), axis_bits, out, d, level.size)
+        axis_llrs(lanes.load(level, d), lanes.load(weight, d), axis_bits, out, d, level.size)
 
 
 @njit
 def _means(llr, axis_bits, n, mean, square):
     for d in range(0, n, N_LANES):
         m, s = expected_level(llr, axis_bits, d, n)
-        store(mean, d, m)
-        store(square, d, s)
+        lanes.store(mean, d, m)
+        lanes.store(square, d, s)
 
 
 @pytest.mark.parametrize("axis_bits", [1, 2, 3, 4])
@@ -113,10 +107,10 @@ def test_the_demapper_does_what_the_reference_says_bit_for_bit(axis_bits):
     weight = (10 ** draws.uniform(-3, 3, n)).astype(np.float32)
     llr = np.empty((axis_bits, n), np.float32)
     _llrs(level, weight, axis_bits, llr.reshape(-1))
-    assert llr.tobytes() == reference.axis_llrs(level, weight, axis_bits).tobytes()
+    assert llr.tobytes() == demapper.axis_llrs(level, weight, axis_bits).tobytes()
     mean, square = np.empty((2, n), np.float32)
     _means(llr.reshape(-1), axis_bits, n, mean, square)
-    plain_mean, plain_square = reference.expected_levels(llr)
+    plain_mean, plain_square = demapper.expected_levels(llr)
     assert mean.tobytes() == plain_mean.tobytes()
     assert square.tobytes() == plain_square.tobytes()
 
@@ -127,7 +121,7 @@ def test_decisions_are_means_over_the_points(modulation):
     axis_bits = modulation.axis_bits
     n = 1 << axis_bits
     llr = rng().integers(-60, 61, (axis_bits, 48)).astype(np.float32)
-    mean, square = reference.expected_levels(llr)
+    mean, square = demapper.expected_levels(llr)
     bits = np.arange(n)[:, None] >> np.arange(axis_bits)[::-1] & 1
     of_one = 1 / (1 + np.exp(llr / 8.0))
     chance = np.prod(np.where(bits[..., None], of_one, 1 - of_one), axis=1)

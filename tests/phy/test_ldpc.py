@@ -9,18 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phy.kernels.bits import get, put, put_signs, to_octets
-from phy.kernels.ldpc import decode_codeword
-from phy.kernels.ldpc_rows import MAX_POSTERIOR
-from phy.ldpc import decode, encode, new_workspace, packed_form
+from phy.kernels import bits as words_of_bits
+from phy.kernels import decode_codeword
 from phy.reference import ldpc as reference
-from phy.segmentation import (
-    LIFTINGS,
-    QuasiCyclic,
-    Segmentation,
-    least_coded,
-    segmentation,
-)
+from phy.testing import LIFTINGS, QuasiCyclic, Segmentation, ldpc, least_coded, segmentation
 from tests.laws import law, often
 
 RATES = [Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(5, 6)]
@@ -58,7 +50,7 @@ def parity_check(code):
 
 def decoded(llr, form, work):
     """Bits `[blocks, n_bits]`."""
-    return np.unpackbits(decode(llr, form, work), axis=1)
+    return np.unpackbits(ldpc.decode(llr, form, work), axis=1)
 
 
 def random_bits(rng, *shape):
@@ -71,7 +63,7 @@ def whole(code):
 
 
 def encoded(code, bits):
-    return encode(bits[None], whole(code))[0]
+    return ldpc.encode(bits[None], whole(code))[0]
 
 
 def noisy(rng, coded, ebn0_db, rate, scale=8):
@@ -130,12 +122,13 @@ def test_every_check_holds_for_every_codeword(code):
 def test_the_vectors_do_what_the_reference_says_bit_for_bit(code):
     """With noise from little to hopeless, and with values at the limits of the range."""
     rng = np.random.default_rng(SEED)
-    work, form = new_workspace().content, packed_form(whole(code)).content
+    work, form = ldpc.new_workspace().content, ldpc.packed_form(whole(code)).content
     outcomes = set()
     for ebn0_db, at_edges in ((9.0, 0), (6.0, 0), (3.0, 0), (2.0, 20), (-3.0, 5)):
         word = encoded(code, random_bits(rng, code.k))
         llr = noisy(rng, word, ebn0_db, code.rate)
-        edges = rng.choice([-511, 0, MAX_POSTERIOR, -MAX_POSTERIOR, 1, -1], at_edges)
+        most = reference.MAX_POSTERIOR
+        edges = rng.choice([-511, 0, most, -most, 1, -1], at_edges)
         llr[rng.integers(0, code.n, at_edges)] = edges
         for n in (1, 2, 12):
             took = decode_codeword(llr, form, n, work)
@@ -155,7 +148,7 @@ def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     form = segmentation(8 * n_bytes, rate, room)
     n_blocks = 2
     bits = random_bits(rng, n_blocks, form.n_bits)
-    coded = encode(bits, form)
+    coded = ldpc.encode(bits, form)
     assert coded.shape == (n_blocks, form.n_coded)
     # The code's own rate is the lowest.
     parity = np.diff(form.ends) - form.shares
@@ -164,7 +157,7 @@ def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     assert form.shares.sum() == form.n_bits
     assert np.ptp(form.shares) <= 1
     llr = (100 - 200 * coded.astype(np.int16)).astype(np.int16)
-    assert np.array_equal(decoded(llr, form, new_workspace()), bits), seed
+    assert np.array_equal(decoded(llr, form, ldpc.new_workspace()), bits), seed
 
 
 @law(40)
@@ -180,10 +173,10 @@ def test_blocks_are_coded_and_decoded_as_the_reference_does(n_bytes, rate, more,
     rng = np.random.default_rng(seed)
     form = segmentation(8 * n_bytes, rate, round(least_coded(8 * n_bytes, rate) * (1 + more)))
     bits, most = random_bits(rng, 1, form.n_bits), 12
-    coded = encode(bits, form)
+    coded = ldpc.encode(bits, form)
     assert np.array_equal(coded, reference.encode_blocks(bits, form)), seed
     llr = noisy(rng, coded, ebn0_db, rate)
-    found = np.unpackbits(decode(llr, form, new_workspace(), most), axis=1)
+    found = np.unpackbits(ldpc.decode(llr, form, ldpc.new_workspace(), most), axis=1)
     assert np.array_equal(found, reference.decode_blocks(llr, form, most)), seed
 
 
@@ -195,15 +188,15 @@ def test_signs_become_words_and_words_octets(sizes, seed):
     words = np.zeros(sum(sizes) // 64 + 2, np.uint64)
     at = 0
     for n in sizes:
-        put_signs(values, at, n, words, at)
+        words_of_bits.put_signs(values, at, n, words, at)
         at += n
     octets = np.empty(-(-at // 8), np.uint8)
-    to_octets(words, octets)
+    words_of_bits.to_octets(words, octets)
     assert np.array_equal(octets, np.packbits(values < 0))
     copied = np.zeros_like(words)
     at = 0
     for n in (min(n, 64) for n in sizes):
-        put(copied, at, np.uint64(get(words, at, n)), n)
+        words_of_bits.put(copied, at, np.uint64(words_of_bits.get(words, at, n)), n)
         at += n
     assert np.array_equal(
         np.unpackbits(copied.view(np.uint8), bitorder="little")[:at], values[:at] < 0
@@ -235,11 +228,12 @@ def test_it_bears_noise_near_its_threshold(n_bytes, rate, ebn0_db):
     """At most 1 % of blocks are lost; with two decibels less, almost all."""
     form = segmentation(8 * (n_bytes + 4), rate, least_coded(8 * (n_bytes + 4), rate))
     rng = np.random.default_rng(SEED)
-    work = new_workspace()
+    work = ldpc.new_workspace()
     rounds = []
     for _ in range(often(1)):
         bits = random_bits(rng, 1000 if n_bytes < 1000 else 300, form.n_bits)
-        llrs = [noisy(rng, encode(bits, form), at_db, rate) for at_db in (ebn0_db, ebn0_db - 2)]
+        coded = ldpc.encode(bits, form)
+        llrs = [noisy(rng, coded, at_db, rate) for at_db in (ebn0_db, ebn0_db - 2)]
         rounds.append([np.any(decoded(llr, form, work) != bits, axis=1).mean() for llr in llrs])
     lost = np.mean(rounds, axis=0)
     assert lost[0] <= 0.01, SEED
@@ -248,9 +242,9 @@ def test_it_bears_noise_near_its_threshold(n_bytes, rate, ebn0_db):
 
 def test_what_cannot_be_decoded_ends_in_time_and_harms_nothing_after_it():
     form = segmentation(1792, RATES[0], 3584)
-    rng, work = np.random.default_rng(SEED), new_workspace()
+    rng, work = np.random.default_rng(SEED), ldpc.new_workspace()
     bits = random_bits(rng, 1, form.n_bits)
-    llr = noisy(rng, encode(bits, form), 4.0, RATES[0])
+    llr = noisy(rng, ldpc.encode(bits, form), 4.0, RATES[0])
     for wrong in (np.zeros_like(llr), -llr, np.full_like(llr, -511), np.full_like(llr, -32768)):
-        decode(wrong, form, work)
+        ldpc.decode(wrong, form, work)
         assert np.array_equal(decoded(llr, form, work), bits)

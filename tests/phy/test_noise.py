@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from phy import compute
-from phy.sizes import NOISE_CHUNK as CHUNK
+from phy.testing import NOISE_CHUNK as CHUNK
+from phy.testing import compute
 
 KEY = 0x0123456789ABCDEF
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phy import REACH, Downsampler, Transmitter, upsample
-from phy.oversampling import low_pass
+from phy.testing import low_pass
 from tests.laws import law
 from tests.phy.signals import hear, heard, noise, noisy, payloads, silence
 

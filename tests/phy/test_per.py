@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from phy import BurstOver, Receiver, Transmitter
-from tests.laws import often
+from tests.laws import at_most, often
 from tests.phy.foreign import FOREIGN
 from tests.phy.quiet import quiet
 from tests.phy.signals import heard, noise, noisy, silence, turned
@@ -34,7 +34,7 @@ def n_lost(n, mcs, size, snr_db, max_frequency=0.02, **settings):
 
 @pytest.mark.soak
 def test_qpsk_half_of_220_bytes_at_6_db_loses_one_in_a_hundred_at_most():
-    assert n_lost(often(1000), mcs=1, size=220, snr_db=6) <= often(10)
+    assert n_lost(often(1000), mcs=1, size=220, snr_db=6) <= at_most(10)
 
 
 @pytest.mark.soak
@@ -56,8 +56,11 @@ def test_qpsk_half_of_220_bytes_at_6_db_loses_one_in_a_hundred_at_most():
     ],
 )
 def test_of_300_bursts_near_the_knee_few_are_lost(mcs, size, snr_db, most):
-    """At each lower SNR one or two percent are lost; with 1 dB less it would exceed `most`."""
-    assert n_lost(often(300), mcs, size, snr_db) <= often(most)
+    """At each lower SNR one or two percent are lost; with 1 dB less it would exceed `most`.
+
+    A third of the bursts notices a loss of 2 dB.
+    """
+    assert n_lost(often(300), mcs, size, snr_db) <= at_most(most)
 
 
 @pytest.mark.parametrize(("mcs", "size", "snr_db"), [(0, 64, -4.0), (1, 220, -1.5), (6, 220, 13.0)])
@@ -70,7 +73,7 @@ def test_the_yardstick_tells_noise_from_signal(mcs, size, snr_db):
 def test_a_wide_search_for_the_carrier_costs_little():
     """±96 kHz at 1 Msps: five times as many hypotheses."""
     n = often(300)
-    assert n_lost(n, mcs=1, size=220, snr_db=1.5, max_frequency=0.096) <= often(9)
+    assert n_lost(n, mcs=1, size=220, snr_db=1.5, max_frequency=0.096) <= at_most(9)
 
 
 @pytest.mark.soak

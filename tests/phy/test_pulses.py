@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phy import N_PULSE, EnergyDetector, Receiver, Transmitter, pulse
-from phy.kernels.sensing import WINDOW
+from phy import SENSE_WINDOW as WINDOW
 from tests.laws import law
 from tests.phy.signals import noise, noisy, payloads, silence, turned
 

@@ -10,14 +10,17 @@ from phy import (
     OFDM_64_8,
     OFDM_64_16,
     BurstOver,
+    FrontEnd,
+    FrontEndParams,
     Modulation,
+    Path,
+    PathParams,
     PduHeard,
     Receiver,
     Transmitter,
     layout,
     points,
 )
-from phy.channel import FrontEnd, FrontEndParams, Path, PathParams
 from tests.laws import law
 from tests.phy.signals import endings, hear, heard, noisy, payloads, silence, turned
 

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phy import GRIDS, MCS_TABLE, Transmitter, header_code, reference
-from phy.header import BurstHeader
-from phy.reference.header import checked, header_bits
-from phy.reference.viterbi import encode
+from phy import GRIDS, MCS_TABLE, Transmitter, reference
+from phy.reference import header
+from phy.testing import BurstHeader, checked_header, header_bits
 from tests.laws import law
 from tests.phy.signals import payloads
 
@@ -84,18 +83,18 @@ def test_what_cannot_be_sent_is_refused_in_the_same_words(kind, settings, call, 
 @given(st.integers(0, 15), st.integers(0, 63), st.integers(0, 2047), st.integers(0, 7))
 def test_headers_are_coded_and_told_as_the_modem_does(mcs, n_pdus, pdu_bytes, network):
     told = BurstHeader(mcs, n_pdus, pdu_bytes, network)
-    coded = header_bits(told, 96)
-    assert np.array_equal(coded, header_code.header_bits(told, 96))
+    coded = header.header_bits(told, 96)
+    assert np.array_equal(coded, header_bits(told, 96))
     octets = header_octets(coded)
-    assert checked(octets) == header_code._checked(octets)
-    assert checked(octets) == (told if mcs < 10 and n_pdus and pdu_bytes else None)
+    assert header.checked(octets) == checked_header(octets)
+    assert header.checked(octets) == (told if mcs < 10 and n_pdus and pdu_bytes else None)
     wrong = bytes([octets[0] ^ 1, *octets[1:]])
-    assert checked(wrong) is header_code._checked(wrong) is None
+    assert header.checked(wrong) is checked_header(wrong) is None
 
 
 def header_octets(coded):
     """Four octets from their coded bits: A and B are each bit's contribution."""
     bits = np.zeros(32, np.uint8)
     for t in range(32):
-        bits[t] = encode(bits)[2 * t] ^ coded[2 * t]
+        bits[t] = reference.viterbi.encode(bits)[2 * t] ^ coded[2 * t]
     return np.packbits(bits).tobytes()

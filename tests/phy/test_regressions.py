@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from phy import OFDM_64_16, Receiver, Transmitter, layout, preamble
-from phy.channel import Path, PathParams
-from phy.header import BurstHeader
-from phy.transmitter import header_samples
+from phy import OFDM_64_16, Path, PathParams, Receiver, Transmitter, layout
+from phy.testing import BurstHeader, header_samples, preamble
 from tests.phy.signals import hear, heard, noise, noisy, payloads, silence, turned
 
 

@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 
 import phy
 from phy import Expected, PduHeard, reference
-from phy.header import n_symbols
-from phy.preamble import length
+from phy.testing import preamble
 from tests.laws import law
 
 RATE = 1_000_000
 GRID = phy.OFDM_64_16
 SIZE, N_PDUS, MCS = 256, 2, 3
 # A header alone: preamble and header symbols.
-HEADER = length(GRID) + n_symbols(GRID) * GRID.n_symbol
+ONE = phy.layout(GRID, MCS, 1, SIZE)
+HEADER = ONE.n_samples - ONE.n_symbols * GRID.n_symbol
 LONGEST = 5000
 EXPECTED = Expected(SIZE, LONGEST, every=RATE // 1000)
 
@@ -116,7 +116,7 @@ def test_a_burst_whose_power_vanishes_claims_no_more():
 def a_flood(rng, n):
     """Preambles whose header is noise, back to back, in a quarter of a second of air."""
     one = a_header(rng)
-    one[length(GRID) :] = noise(rng, HEADER - length(GRID), 0)
+    one[preamble.length(GRID) :] = noise(rng, HEADER - preamble.length(GRID), 0)
     return (np.tile(one, n // HEADER) + noise(rng, n // HEADER * HEADER)).astype(np.complex64)
 
 

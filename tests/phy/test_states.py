@@ -6,20 +6,21 @@ import numpy as np
 import pytest
 
 from phy import Receiver
-from phy.states import NEXT, Found, IllegalStepError, State, after
+from phy.testing import states
+from tests.phy.chunks import make_stream
 from tests.phy.signals import noise
-from tests.phy.test_chunking import make_stream
 
 PIECE = 700
+State, Found, NEXT = states.State, states.Found, states.NEXT
 
 
 @pytest.mark.parametrize(("state", "found"), [*itertools.product(State, Found)])
 def test_every_step_is_allowed_or_refused(state, found):
     if (state, found) in NEXT:
-        assert after(state, found) is NEXT[state, found]
+        assert states.after(state, found) is NEXT[state, found]
         return
-    with pytest.raises(IllegalStepError, match=f"{found.name} in {state.name}"):
-        after(state, found)
+    with pytest.raises(states.IllegalStepError, match=f"{found.name} in {state.name}"):
+        states.after(state, found)
 
 
 def test_every_state_can_be_reached_and_left():
@@ -34,11 +35,12 @@ def test_signals_take_every_allowed_step(monkeypatch):
     """Bursts, foreign ones, tones, invalid headers, fades, and gaps at any time."""
     taken = set()
 
-    def spy(state, found):
-        taken.add((state, found))
-        return after(state, found)
+    class Spied(dict):
+        def get(self, step):
+            taken.add(step)
+            return super().get(step)
 
-    monkeypatch.setattr("phy.receiver.after", spy)
+    monkeypatch.setattr(states, "NEXT", Spied(NEXT))
     for seed in range(30):
         rng = np.random.default_rng(seed)
         x = make_stream(seed)[0]

@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 
 from phy import MCS_TABLE, OFDM_64_8, OFDM_64_16, Modulation, points
-from phy.crc import checked, crc8, with_crc32
-from phy.header import N_BITS, BurstHeader
-from phy.header_code import header_bits, parse_header
-from phy.interleaver import order
-from phy.kernels.acquisition import fold
-from phy.kernels.viterbi import decode_block
-from phy.sequences import polarity, whitening
+from phy.kernels import decode_block, fold
+from phy.testing import BurstHeader, crc, header_bits, order, parse_header, polarity, whitening
 
 # IEEE 802.11-2020, equation 17-25.
 POLARITY = (
@@ -132,17 +127,17 @@ def test_the_grid_is_the_standards(grid):
 
 
 def test_check_values():
-    assert crc8(b"123456789") == 0xF4
-    assert with_crc32(b"123456789") == b"123456789" + bytes.fromhex("cbf43926")
+    assert crc.crc8(b"123456789") == 0xF4
+    assert crc.with_crc32(b"123456789") == b"123456789" + bytes.fromhex("cbf43926")
 
 
 def test_a_wrong_bit_fails_the_check():
-    block = with_crc32(b"some bytes")
-    assert checked(block) == b"some bytes"
+    block = crc.with_crc32(b"some bytes")
+    assert crc.checked(block) == b"some bytes"
     for bit in range(8 * len(block)):
         wrong = bytearray(block)
         wrong[bit // 8] ^= 1 << bit % 8
-        assert checked(bytes(wrong)) is None
+        assert crc.checked(bytes(wrong)) is None
     assert zlib.crc32(b"some bytes") == int.from_bytes(block[-4:], "big")
 
 
@@ -154,7 +149,7 @@ def read(llr):
     """The header decoded from LLRs of its symbols."""
     folded, octets = np.empty(76, np.int16), np.empty(4, np.uint8)
     fold(llr, folded)
-    decode_block(folded, np.empty(N_BITS + 6, np.uint64), octets)
+    decode_block(folded, np.empty(38, np.uint64), octets)
     return parse_header(octets, folded)
 
 
@@ -185,8 +180,8 @@ def test_a_header_is_the_first_likely_word_whose_check_holds():
         llr = np.clip(16 * y, -511, 511).astype(np.int16)
         folded, octets = np.empty(76, np.int16), np.empty(4, np.uint8)
         fold(llr, folded)
-        decode_block(folded, np.empty(N_BITS + 6, np.uint64), octets)
-        n_likeliest += crc8(octets[:3].tobytes()) == octets[3]
+        decode_block(folded, np.empty(38, np.uint64), octets)
+        n_likeliest += crc.crc8(octets[:3].tobytes()) == octets[3]
         n_read += read(llr) == header
     assert n_read > n_likeliest + 20
     assert n_read > 380

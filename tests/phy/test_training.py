@@ -3,15 +3,9 @@
 import numpy as np
 import pytest
 
-from phy import OFDM_64_16, compute
-from phy.estimation import in_planes, new_channel, new_scratch, tones
-from phy.kernels.smoothing import smooth
-from phy.kernels.timing import correlate
-from phy.kernels.training import estimate, learn, least_squares, turn_back
-from phy.numerology import GRIDS
-from phy.reference import smoothing, timing, training, viterbi
-from phy.reference.channel import Channel
-from phy.reference.ofdm import turned_back
+from phy import GRIDS, OFDM_64_16, kernels, reference
+from phy.reference import smoothing, timing, training
+from phy.testing import compute, in_planes, new_channel, new_scratch, tones
 from tests.phy.signals import noise
 
 SEED = 48
@@ -34,7 +28,7 @@ def test_correlation_with_two_templates_in_a_row(n):
     """Templates longer than 64 samples add up as powers."""
     z, templates = noise(rng(), 2 * n + 8), noise(rng(), 3 * n).reshape(3, n)
     out = np.empty((3, 8), np.float32)
-    correlate(planes_of(z), templates, out)
+    kernels.correlate(planes_of(z), templates, out)
     assert out == pytest.approx(timing.strengths(z, templates, 8), rel=1e-4)
 
 
@@ -42,8 +36,8 @@ def test_correlation_with_two_templates_in_a_row(n):
 def test_samples_are_turned_back(frequency):
     x = noise(rng(), 679)
     out = np.empty((2, 700), np.float32)
-    turn_back(x, 0.1 - 0.2j, frequency, out)
-    wanted = turned_back(x, 0.1 - 0.2j, frequency)
+    kernels.turn_back(x, 0.1 - 0.2j, frequency, out)
+    wanted = reference.ofdm.turned_back(x, 0.1 - 0.2j, frequency)
     assert out[0, :679] + 1j * out[1, :679] == pytest.approx(wanted, abs=1e-5)
 
 
@@ -55,7 +49,7 @@ def test_least_squares_tells_gains_and_noise():
     h = np.array([1, 2j, -0.5, 0.1 + 0.1j])
     y = noise(draws, 4000 * 4, 0.3).reshape(4000, 4) + amplitude[:, None] * h * sent
     found = np.empty((2, 8), np.float32)
-    noise_power, power = least_squares(in_planes(y), amplitude, in_planes(sent), found)
+    noise_power, power = kernels.least_squares(in_planes(y), amplitude, in_planes(sent), found)
     assert found[0, :4] + 1j * found[1, :4] == pytest.approx(h, abs=0.03)
     assert noise_power == pytest.approx(4 * 0.3, rel=0.03)
     assert power == pytest.approx(np.sum(np.abs(h) ** 2), rel=0.03)
@@ -75,9 +69,9 @@ def test_a_header_tells_how_much_stronger_the_preamble_was(boost):
     amplitude = np.array([boost, boost, 1, 1], np.float32)
     y = noise(draws, 4 * 52, 0.01).reshape(4, 52) + amplitude[:, None] * h * sent
     channel, known = new_channel(grid).content, in_planes(sent)
-    estimate(in_planes(y[:2]), np.ones(2, np.float32), known[:2], table, channel, scratch)
+    kernels.estimate(in_planes(y[:2]), np.ones(2, np.float32), known[:2], table, channel, scratch)
     assert gains(channel, 52) == pytest.approx(boost * h, abs=0.1)
-    learn(in_planes(y), known, 2, 0.0, 0.0, table, channel, scratch)
+    kernels.learn(in_planes(y), known, 2, 0.0, 0.0, table, channel, scratch)
     assert np.mean(np.abs(gains(channel, 52) - h) ** 2) < 0.1 * 0.01
     assert channel.no == pytest.approx(0.01, rel=0.3)
 
@@ -87,10 +81,10 @@ def smoothed(h, no, grid=OFDM_64_16):
     rough = h + noise(np.random.default_rng(SEED), len(h), no)
     channel = new_channel(grid).content
     channel.h[:] = in_planes(rough[None])[0]
-    smooth(no, tones(grid).content, channel, new_scratch(grid).content)
+    kernels.smooth(no, tones(grid).content, channel, new_scratch(grid).content)
     in_order = np.empty_like(rough)
     in_order[grid.tones] = rough
-    other = Channel(in_order, no, 1.0)
+    other = reference.channel.Channel(in_order, no, 1.0)
     smoothing.smooth(in_order, no, other, grid)
     assert gains(channel, len(h)) == pytest.approx(other.h[grid.tones], abs=1e-4)
     return gains(channel, len(h)), channel.unknown
@@ -138,7 +132,7 @@ def test_the_likeliest_code_words_come_first():
         best = np.argsort(-score, kind="stable")[:n_list]
         out = np.empty((n_list, padded.shape[1]), np.uint8)
         compute.list_decode(llr, out)
-        assert np.array_equal(viterbi.decode(llr, n_list), out), seed
+        assert np.array_equal(reference.viterbi.decode(llr, n_list), out), seed
         found = np.packbits(out[:, :n_bits], axis=1)[:, 0]
         assert list(score[found]) == list(score[best]), seed
         assert len(set(found)) == n_list

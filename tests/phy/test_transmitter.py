@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import resample_poly
 
-from phy import GRIDS, MCS_TABLE, OFDM_64_16, BurstOver, Receiver, Transmitter, preamble
+from phy import GRIDS, MCS_TABLE, OFDM_64_16, BurstOver, Receiver, Transmitter
+from phy.testing import preamble
 from tests.phy.signals import heard, noisy, payloads, silence, turned
 
 SEED = 67

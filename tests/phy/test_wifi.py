@@ -81,6 +81,7 @@ def test_frames_of_802_11n_are_told_as_such(greenfield, mcs, n_bytes, wide):
     assert last.psdu == psdu
 
 
+@pytest.mark.slow
 def test_a_frame_of_6_mbit_whatever_is_in_it_is_none_of_802_11n():
     rng = np.random.default_rng(SEED)
     sent = psdus(rng, 60)

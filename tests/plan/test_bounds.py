@@ -9,7 +9,7 @@ from sdrlinkd.cli import run
 from sdrlinkd.config import parse_config
 from sdrlinkd.errors import UserError
 from sdrlinkd.plan import bounds_of, setting_of
-from tests.plan.test_plan import CONFIG, REGISTRY
+from tests.plan.team import CONFIG, REGISTRY
 
 
 def bounds(policy, *robots):

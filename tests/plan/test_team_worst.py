@@ -5,7 +5,7 @@ import pytest
 
 from sdrlinkd.plan import team_worst_s
 from sdrlinkd.reports import ReservedFlowReport
-from tests.plan.test_plan import setting
+from tests.plan.team import setting
 
 FLOW = ReservedFlowReport(
     src=1, topic_id=0, name="scan", qos="latency", priority=64, dst=2, via=[], rate_hz=50.0,

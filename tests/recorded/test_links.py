@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from sdrlinkd.lab import load_scenario
-from sdrlinkd.lab.scenario import outages_of
-from sdrlinkd.lab.traces import read_outages
+from sdrlinkd.lab.testing import outages_of, read_outages
 from tests.lab.scenarios import SHIPPED
 from tests.link.images import images_over
 

@@ -6,8 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from phy.ldpc import encode
-from phy.segmentation import QuasiCyclic, Segmentation
+from phy.testing import QuasiCyclic, Segmentation, ldpc
 from phy.wifi import HtFrame, HtSignal, WifiFrame, receive
 from tests.phy.quiet import quiet
 
@@ -72,6 +71,6 @@ def test_codewords_made_elsewhere_are_ours(data):
         code = QuasiCyclic(each["n"] // 24, Fraction(each["k"], each["n"]))
         word = np.unpackbits(np.frombuffer(bytes.fromhex(each["codeword_hex"]), np.uint8))[: code.n]
         form = Segmentation(code, code.k, 1, code.n)
-        assert np.array_equal(encode(word[None, : code.k].copy(), form)[0], word)
+        assert np.array_equal(ldpc.encode(word[None, : code.k].copy(), form)[0], word)
         seen.add((code.n, code.rate))
     assert len(seen) == 12

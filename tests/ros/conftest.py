@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.backends.hubs import serving
-from tests.daemon.test_ether_daemon import AIR
+from tests.daemon.ether import AIR
 from tests.ros.programs import Agent, Bridge
 from tests.ros.wheels import REQUIRED, lacking
 

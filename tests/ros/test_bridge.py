@@ -22,7 +22,7 @@ from tests.ros.team import (
 )
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500)]
+pytestmark = pytest.mark.realtime
 
 TRIES = 3
 """A team is run again, twice at most, if this machine was too busy for the radios."""
@@ -118,6 +118,7 @@ def run_team(start_daemon, start, hub):
     return None
 
 
+@pytest.mark.long
 def test_commands_go_one_way_though_the_robots_own_planner_uses_the_name(start_daemon, start, hub):
     policy = "[topic.cmd_vel]\ndeadman_s = 1.0\nlifespan_s = 0.5\n"
     one = Robot(start, start_daemon(config(hub, 1))).bridged().watched()
@@ -152,6 +153,7 @@ def test_commands_go_one_way_though_the_robots_own_planner_uses_the_name(start_d
     assert two.node.publishers_of(topic="/led") == ["node"]
 
 
+@pytest.mark.long
 def test_twelve_of_sixty_topics_are_wanted_and_only_these_are_on_the_air(start_daemon, start, hub):
     one = Robot(start, start_daemon(config(hub, 1))).bridged()
     two = Robot(start, start_daemon(config(hub, 2))).bridged()

@@ -28,7 +28,7 @@ from tests.ros.team import (
 from tests.ros.wheels import environment, python
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.realtime, pytest.mark.long]
 
 OTHER_HASH = "RIHS01_" + "ab" * 32
 IMAGE = "sensor_msgs/msg/Image"
@@ -241,7 +241,7 @@ def test_bridges_that_see_each_other_refuse_and_name_both(start_daemon, start, h
 
 
 def test_without_rclpy_or_client_it_says_what_to_run(ros):
-    for path, says in ((python(), "pip install sdrlinkd-client"), (sys.executable, "setup.bash")):
+    for path, says in ((python(), "pip install ./etc/client"), (sys.executable, "setup.bash")):
         variables = environment(1, PYTHONPATH=BRIDGE)
         done = subprocess.run(
             [path, "-m", "sdrlink_ros"],

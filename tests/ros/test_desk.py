@@ -11,17 +11,16 @@ import zenoh
 from zenoh_ros2_sdk import ROS2ServiceClient
 
 from benchmarks.fleet.field import GUARD
-from sdrlinkd.fleet.ros.attachment import Attachment
-from sdrlinkd.fleet.ros.names import Node, Qos, Role
+from sdrlinkd.fleet.testing import Attachment, Node, Qos, Role
 from sdrlinkd.process import Process, module
 from tests.fleet.conftest import Router
+from tests.ros.rough_air import air, hub, world
 from tests.ros.team import WAIT_S, Robot, config
-from tests.ros.test_services import air, hub, world
 from tests.waiting import wait_for
 
 __all__ = ["air", "hub", "world"]
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500)]
+pytestmark = [pytest.mark.realtime, pytest.mark.long]
 
 DOMAIN, HASH = 42, f"RIHS01_{'ab' * 32}"
 ALLOW = ("-p", 'services.allow:=["/set", "/fibonacci", "/secret"]')

@@ -16,7 +16,7 @@ from sdrlink_ros.routes import decide
 from sdrlink_ros.settings import Settings
 
 from sdrlinkd.adapters import empty, to_cdr
-from sdrlinkd.adapters.typestore import ros2_types
+from sdrlinkd.adapters.testing import ros2_types
 
 ODOM, IMAGE = "nav_msgs/msg/Odometry", "sensor_msgs/msg/Image"
 TF = "tf2_msgs/msg/TFMessage"

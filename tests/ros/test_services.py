@@ -1,57 +1,16 @@
 """Services and actions of real ROS 2 nodes over air that loses a fifth of the bursts, and fails."""
 
-from random import Random
-
 import pytest
 
-from backends.ether.world import World
-from tests.backends.hubs import serving
-from tests.daemon.test_ether_daemon import AIR
 from tests.ros.programs import Agent
 from tests.ros.team import WAIT_S, Robot, config
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500)]
+pytestmark = pytest.mark.realtime
 
 ALLOW = ("-p", 'services.allow:=["/set", "/fibonacci"]')
 SUCCEEDED, CANCELED = 4, 5
 N_CALLS = 200
-
-
-class RoughWorld(World):
-    """An air that loses a share of the bursts, and can be cut."""
-
-    def __init__(self, *arguments):
-        super().__init__(*arguments)
-        self.rng, self.loss, self.is_cut = Random(1), 0.0, False
-
-    def hop(self, sender, receiver, t):
-        if self.is_cut or self.rng.random() < self.loss:
-            return None
-        return super().hop(sender, receiver, t)
-
-
-@pytest.fixture(scope="module")
-def world():
-    return []
-
-
-@pytest.fixture(scope="module")
-def hub(tmp_path_factory, world):
-    folder = tmp_path_factory.mktemp("hub")
-
-    def make(*arguments):
-        world.append(RoughWorld(*arguments))
-        return world[0]
-
-    with serving(folder, **AIR, snr_db=30.0, world=make):
-        yield folder
-
-
-@pytest.fixture
-def air(hub, world):
-    yield world[0]
-    world[0].loss, world[0].is_cut = 0.0, False
 
 
 @pytest.fixture
@@ -74,6 +33,7 @@ def test_200_calls_over_a_link_that_loses_a_fifth_are_each_executed_once(robots,
     )
 
 
+@pytest.mark.long
 def test_calls_in_an_outage_are_executed_once_or_not_at_all(robots, air):
     one, two = robots
     one.node.serve(name="/set")
@@ -95,6 +55,7 @@ def test_calls_in_an_outage_are_executed_once_or_not_at_all(robots, air):
         two.bridge.says("/set of robot 1: no answer came in time")
 
 
+@pytest.mark.long
 def test_an_action_survives_an_outage_in_its_middle_and_can_be_cancelled(robots, air):
     one, two = robots
     one.node.act(name="/fibonacci", step_s=1.0)
@@ -120,6 +81,7 @@ def test_an_action_survives_an_outage_in_its_middle_and_can_be_cancelled(robots,
     assert one.node.n_goals() == 2, "no goal was sent twice"
 
 
+@pytest.mark.long
 def test_what_cannot_be_called_is_said_and_ends_no_other(robots, start):
     one, two = robots
     one.node.serve(name="/set")

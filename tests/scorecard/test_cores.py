@@ -16,10 +16,11 @@ from tests.fuzz.mutate import mutate
 from tests.fuzz.targets import TARGETS
 from tests.link.world import make_link, next_burst, rx
 from tests.scorecard.helpers import CDR, own_rss_mib
-from tests.sealing.test_attacks import Commands, Recorder, judge, pair
-from tests.sealing.test_numbers import KEY, NEXT, Machine
+from tests.sealing.attacks import Commands, Recorder, judge, pair
+from tests.sealing.machine import Machine
+from tests.sealing.team import KEY, NEXT
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 OUTCOMES = (Outcome.SENT,) * 4 + (Outcome.LATE, Outcome.LOST)
 EVENTS = ("send", "send", "send", "time", "late", "disk", "restart", "anew")

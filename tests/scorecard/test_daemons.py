@@ -19,7 +19,7 @@ from tests.scorecard.helpers import (
 )
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 FLOOD = """
     from sdrlinkd.client import Publisher

@@ -12,7 +12,7 @@ from tests.programs import sdrlinkctl
 from tests.scorecard.helpers import CDR, Counting, problems
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 def hub(folder):

@@ -80,6 +80,7 @@ def test_a_station_that_only_receives_can_take_all(of_topic):
     assert link.audit() == []
 
 
+@pytest.mark.slow
 def test_five_robots_with_tdma_start_cold():
     access = AccessParams(
         policy="tdma", nodes=[1, 2, 3, 4, 5], slot_s=0.025, guard_s=0.002, minislot_s=0.0
@@ -213,7 +214,9 @@ def test_after_an_outage_one_way_messages_come_again_at_once(off_s):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("pdu_size", "robots"), [(46, 8), (64, 16)])
+@pytest.mark.parametrize(
+    ("pdu_size", "robots"), [(46, 8), pytest.param(64, 16, marks=pytest.mark.long)]
+)
 def test_many_robots_in_small_pdus_stay_proven(pdu_size, robots):
     team = Team(*(Robot(each, [KEY], pdu_size=pdu_size) for each in range(1, robots + 1)))
     team.run(20.0)
@@ -225,6 +228,7 @@ def test_many_robots_in_small_pdus_stay_proven(pdu_size, robots):
     assert [dropped(team, each).get("sec_unproven", 0) for each in team.robots] == before
 
 
+@pytest.mark.slow
 def test_drift_of_hours_gains_nothing():
     """One direction is jammed; the other is delayed by as much as the clocks drift apart."""
     team = Team(Robot(1, [KEY], drift=2e-4), Robot(2, [KEY], drift=-2e-4))

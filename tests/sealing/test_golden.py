@@ -3,7 +3,7 @@
 import pytest
 
 from sdrlinkd.sealing import Key
-from sdrlinkd.sealing.ciphers import Ciphers
+from sdrlinkd.sealing.testing import Ciphers
 from sdrlinkd.wire import (
     Contact,
     KeyTold,

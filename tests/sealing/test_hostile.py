@@ -1,11 +1,12 @@
 """Any octets from the air: nothing breaks, nothing forged arrives, and the ledger adds up."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import AccessParams, Outcome
 from sdrlinkd.sealing import Key, SecurityParams
-from sdrlinkd.sealing.ciphers import Ciphers
+from sdrlinkd.sealing.testing import Ciphers
 from sdrlinkd.wire import KeyTold, delayed, parse, parse_sealed, read_control_entries
 from tests.laws import law
 from tests.sealing.team import KEY, Robot, Team
@@ -137,6 +138,7 @@ def test_a_clear_pdu_that_comes_back_stays_readable():
         assert isinstance(told, KeyTold)
 
 
+@pytest.mark.slow
 def test_a_disk_that_does_not_answer_stops_sealing_and_nothing_else():
     """Not even a burst that comes back, and would be made anew, breaks anything."""
     access = AccessParams(policy="tdma", nodes=[1, 2], slot_s=0.025, guard_s=0.002, reuse=False)

@@ -6,9 +6,10 @@ from random import Random
 import pytest
 
 from sdrlinkd.wire import is_sealed, parse_sealed
-from tests.sealing.test_attacks import Commands, chain, judge, pair
+from tests.sealing.attacks import Commands, chain, judge, pair
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "victim"), [(pair, 2), (chain, 3)])
 def test_what_the_air_loses_is_repeated_and_opens(make, victim):
     chance = Random(3)

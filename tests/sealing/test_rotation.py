@@ -2,8 +2,8 @@
 
 import pytest
 
-from sdrlinkd.sealing import Remembered, rotation
-from sdrlinkd.sealing.rotation import QUIET_S
+from sdrlinkd.sealing import Remembered
+from sdrlinkd.sealing.testing import CONSTANTS, QUIET_S
 from sdrlinkd.wire import N_TICKS, parse_sealed
 from tests.sealing.team import KEY, NEXT, Robot, Team
 
@@ -15,19 +15,20 @@ def kid_in_use(robot, now):
 
 
 class Messages:
-    """Each robot sends 100 messages a second."""
+    """Each robot sends 20 messages a second."""
 
     def __init__(self, team):
         self.team, self.sent = team, 0
 
     def __call__(self, now):
-        if round(now / 0.005) % 2:
+        if round(now / 0.005) % 10:
             return
         self.sent += 1
         for robot in self.team.robots.values():
             robot.link.submit(1, CDR + self.sent.to_bytes(4, "big"), robot.clock(now))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("apart_s", [0.0, 7.0])
 def test_none_lost_while_keys_change(apart_s):
     team = Team(*(Robot(each, [KEY]) for each in (1, 2, 3)))
@@ -50,9 +51,10 @@ def test_none_lost_while_keys_change(apart_s):
             assert heard == [CDR + n.to_bytes(4, "big") for n in range(1, flow.sent + 1)]
 
 
+@pytest.mark.slow
 def test_a_lost_robot_delays_the_others_for_a_limited_time_and_is_out_then(monkeypatch):
     longest_s = 60.0
-    monkeypatch.setattr(rotation, "LONGEST_S", longest_s)
+    monkeypatch.setattr(*CONSTANTS["longest_s"], longest_s)
     team = Team(*(Robot(each, [KEY]) for each in (1, 2, 3)))
     team.run(2.0)
     for each in (1, 2):
@@ -97,6 +99,7 @@ def test_a_key_in_place_of_another_is_used_at_once():
     assert team.robots[1].link.report(team.robots[1].clock(team.now)).security.proven == [2]
 
 
+@pytest.mark.slow
 def test_a_key_that_was_replaced_does_not_open_after_a_restart_either():
     team = Team(Robot(1, [KEY]), Robot(2, [KEY]))
     team.run(2.0)
@@ -113,6 +116,7 @@ def test_a_key_that_was_replaced_does_not_open_after_a_restart_either():
     assert report.rx.pdus_dropped == {"sec_unknown_kid": 1}
 
 
+@pytest.mark.slow
 def test_the_next_key_has_a_life_of_its_own():
     """Its T begins at 0 where the old key has used more than half of its own."""
     begin = N_TICKS // 2 + 32 * 1000

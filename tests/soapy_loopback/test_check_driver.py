@@ -13,8 +13,8 @@ ROOT = Path(__file__).parents[2]
 PYTHON = "/usr/bin/python3"
 
 
+@pytest.mark.long
 @pytest.mark.realtime
-@pytest.mark.slow
 def test_driver_passes_its_checks():
     if why := missing():
         pytest.skip(why)

@@ -4,7 +4,7 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.web.air_log import MOST_BURSTS, AirLog
+from sdrlinkd.web.testing import MOST_BURSTS, AirLog
 from tests.laws import law
 
 OWN = {"at": 5_000_000, "us": 250, "mcs": 3, "n": 2, "q": "urgent", "end": "sent"}

@@ -58,9 +58,8 @@ def grows(lab, open_browser, for_s):
         assert "Error" not in page.err(), page.err()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.soak
-@pytest.mark.timeout(0)
 def test_two_minutes_without_growth(lab, open_visitor):
     """Two minutes in all, and most of an hour in `make soak`."""
     grows(lab, open_visitor, often(90))

@@ -1,15 +1,17 @@
 """The last ten minutes of a station, once a second."""
 
 from sdrlinkd.reports import ClockReport
-from sdrlinkd.web.charts import (
+from sdrlinkd.web.testing import (
+    KEPT_S,
+    MOST_LINES,
     PICTURES,
+    History,
     empty_chart,
     empty_waterfall,
     newest,
     series,
     waterfall,
 )
-from sdrlinkd.web.history import KEPT_S, MOST_LINES, History
 from tests.reported import neighbor, snapshot, topic
 
 

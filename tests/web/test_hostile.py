@@ -15,7 +15,7 @@ from sdrlinkd.reports import (
 from tests.programs import sdrlinkctl
 from tests.reported import neighbor, snapshot, topic
 from tests.web.conftest import page_of
-from tests.web.test_map import ODOMETRY, odometry
+from tests.web.odometry import ODOMETRY, odometry
 
 pytestmark = pytest.mark.slow
 SCRIPT = "<script>window.hurt=1</script>"

@@ -1,6 +1,6 @@
 """Where robots are, their paths, and what is drawn of their links."""
 
-from math import cos, inf, nan, pi, radians, sin
+from math import cos, inf, nan, pi, radians
 
 import pytest
 from hypothesis import given
@@ -8,22 +8,13 @@ from hypothesis import strategies as st
 
 from sdrlinkd.adapters import PLACES, empty, to_cdr
 from sdrlinkd.reports import FlowReport, RobotLinksReport, RoutesReport
-from sdrlinkd.web.map_data import map_paths, map_view
-from sdrlinkd.web.positions import position_in
-from sdrlinkd.web.track import MOST_POINTS
-from sdrlinkd.web.world import World
+from sdrlinkd.web import World
+from sdrlinkd.web.testing import MOST_POINTS, map_paths, map_view, position_in
 from tests.laws import law
 from tests.reported import neighbor, snapshot
+from tests.web.odometry import ODOMETRY, odometry
 
-ODOMETRY = "nav_msgs/msg/Odometry"
 FIX = "sensor_msgs/msg/NavSatFix"
-
-
-def odometry(x, y, heading=0.0):
-    message = empty(ODOMETRY)
-    at, turn = message.pose.pose.position, message.pose.pose.orientation
-    at.x, at.y, turn.z, turn.w = x, y, sin(heading / 2), cos(heading / 2)
-    return to_cdr(message, ODOMETRY)
 
 
 def fix(latitude, longitude, status=0):

@@ -11,7 +11,7 @@ from sdrlinkd.config import load_config
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.link import TopicPolicy
 from sdrlinkd.plan import Load
-from sdrlinkd.web.what_if import Choice, foresee, loads_of, policy_of, traffic_of
+from sdrlinkd.web.testing import Choice, foresee, loads_of, policy_of, traffic_of
 from tests.reported import snapshot, topic
 
 LOADS = [Load(1, "odom", 50.0, 700.0, 700.0), Load(2, "scan", 10.0, 4000.0, 4000.0)]

@@ -23,7 +23,7 @@ from sdrlinkd.wire import (
     postponed,
 )
 from tests.laws import law
-from tests.wire.test_pdu import sized_pdus
+from tests.wire.pdus import sized_pdus
 from tests.wire.vectors import BY_NAME, crc16_xmodem, reseal
 
 octet = st.integers(0, 255)

@@ -40,7 +40,7 @@ def main(argv: "list[str] | None" = None) -> int:
     except ImportError as error:
         print(  # noqa: T201
             f"sdrlink_ros: this Python has no client of sdrlinkd ({error}); "
-            "run: pip install sdrlinkd-client",
+            f"in a checkout of sdrlinkd, run: {sys.executable} -m pip install ./etc/client",
             file=sys.stderr,
         )
         return 2

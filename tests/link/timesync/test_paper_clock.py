@@ -3,7 +3,7 @@
 import pytest
 
 from sdrlinkd.link import State
-from tests.link.timesync.test_clocks import Pair
+from tests.link.timesync.pair import Pair
 
 CONVERGES = 500
 """Round trips that the paper's filter needs to converge (Equation 6)."""

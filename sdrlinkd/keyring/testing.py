@@ -1,0 +1,14 @@
+"""What tests look at, piece by piece; not part of the interface."""
+
+from types import ModuleType
+
+from sdrlinkd.keyring import state
+
+__all__ = [
+    "CONSTANTS",
+]
+
+CONSTANTS: dict[str, tuple[ModuleType, str]] = {
+    "machine_id": (state, "MACHINE_ID"),
+}
+"""Constants that tests replace: `monkeypatch.setattr(*CONSTANTS["machine_id"], path)`."""
