@@ -85,15 +85,17 @@ def test_robots_take_every_step_of_tdma(taken):
     above, below = frame_of(robot(), 1, 0), frame_of(robot(), 3, 0)
     follower = robot()
     follower.take_frame(1, above, 1.0)
-    follower.take_frame(1, above, 1.0 + 16 * follower.round_s)
-    assert "schedule of robot 1, 1 hops away" in follower.state
+    later = 1.0 + 16 * follower.round_s
+    follower.take_frame(1, above, later)
+    told = follower.frame(later)
+    assert (told.root, told.level) == (1, 1)
     follower.slot(wish(60.0))
-    assert follower.state.endswith("schedule of robot 2")
+    assert follower.frame(60.0).root == 2
     root = robot()
     root.take_frame(3, below, 1.0)
     root.slot(wish(30.0))
     root.take_frame(3, below, 30.0)
-    assert root.state.endswith("schedule of robot 2")
+    assert root.frame(30.0).root == 2
     root.take_frame(1, above, 31.0)
     root.take_frame(1, above, 31.0 + 10 * root.round_s)
     assert "1 hops away" in root.state
