@@ -138,6 +138,7 @@ def completed(words, directory):
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_tab_knows_live_names(daemon):
     with Publisher(daemon.directory) as out:
         out.send(ODOM, to_cdr(empty(KIND), KIND))
