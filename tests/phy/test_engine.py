@@ -69,14 +69,14 @@ def exactly(told):
 
 def on_numba(monkeypatch):
     """Have numba compile the kernels in this process, and call those."""
+
+    def called(kernel):
+        return lambda *given: kernel(
+            *(x.packed if isinstance(x, ArgumentBlock) else x for x in given)
+        )
+
     for name in ENTRIES:
-
-        def call(*given, name=name):
-            return getattr(kernels, name)(
-                *(x.packed if isinstance(x, ArgumentBlock) else x for x in given)
-            )
-
-        monkeypatch.setattr(compute, name, call, raising=False)
+        monkeypatch.setattr(compute, name, called(getattr(kernels, name)), raising=False)
 
 
 @pytest.mark.long

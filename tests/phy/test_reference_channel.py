@@ -159,7 +159,7 @@ def equalised(grid, modulation, n, lean, no):
 
 
 @pytest.mark.parametrize(
-    ("modulation", "grid"), [*zip(Modulation, cycle(GRIDS.values()))], ids=[*Modulation.__members__]
+    ("modulation", "grid"), [*zip(Modulation, cycle(GRIDS.values()))], ids=Modulation.__members__
 )
 @pytest.mark.parametrize("noise_share", [0.3, 1e-3])
 def test_symbols_are_equalised_alike(grid, modulation, noise_share):

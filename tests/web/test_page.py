@@ -9,7 +9,7 @@ from PIL import Image
 from sdrlinkd.client import ControlClient
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 VIEWS = ("Map", "Link", "Air", "Topics", "What if")
 
 
