@@ -139,7 +139,7 @@ async def test_a_reader_far_behind_finds_a_gap(monkeypatch, few_waiting):
         await asyncio.sleep(0.35)
         taken.append(await gap_in(blocks, taken))
         # From here on there are no more blocks, so the count is of those that were taken.
-        monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", FOREVER_S)
+        monkeypatch.setattr(*CONSTANTS["loopback_max_behind_s"], FOREVER_S)
         again = TxBurst(taken[-1].index + taken[-1].n + 10_000, noise(200))
         (report,), more = await send(radio, blocks, [again])
         taken += more

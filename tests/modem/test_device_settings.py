@@ -5,7 +5,7 @@ from random import Random
 import msgspec
 import pytest
 
-from backends import SoapyParams
+from backends import SoapyParams, SoapyRadio
 from sdrlinkd.config import Config, ModemParams
 from sdrlinkd.modem import make_radio
 
@@ -28,7 +28,7 @@ def test_each_key_is_tried():
 @pytest.mark.parametrize("key", OTHERS)
 def test_what_is_configured_reaches_the_device(key, monkeypatch):
     made = []
-    monkeypatch.setattr("backends.making.SoapyRadio", lambda *given: made.append(given))
+    monkeypatch.setattr(SoapyRadio, "__init__", lambda _, *given: made.append(given))
     config = Config(
         backend="soapy",
         soapy=SoapyParams(**{key: OTHERS[key]}),
