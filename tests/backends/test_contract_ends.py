@@ -1,6 +1,7 @@
 """The contract of every radio when it is closed, and with a consumer that stops."""
 
 import asyncio
+import threading
 
 import pytest
 
