@@ -36,8 +36,8 @@ def descendants(pid: int) -> Iterator[int]:
             yield from descendants(child)
 
 
-def started_by(mark: str) -> Iterator[tuple[int, str]]:
-    """Each living process that has `mark` in its environment, and the test that started it."""
+def started_by(mark: str) -> Iterator[tuple[int, str, str]]:
+    """Each living process with `mark` in its environment: id, test that began it, command."""
     for process in Path("/proc").glob("[0-9]*"):
         try:
             words = (process / "environ").read_bytes().decode(errors="replace").split("\0")
@@ -46,7 +46,12 @@ def started_by(mark: str) -> Iterator[tuple[int, str]]:
             continue
         if mark in words and not is_zombie and int(process.name) != os.getpid():
             test = next((w for w in words if w.startswith("PYTEST_CURRENT_TEST=")), "=no test")
-            yield int(process.name), test.partition("=")[2].rpartition(" ")[0]
+            command = (process / "cmdline").read_bytes().decode(errors="replace")
+            yield (
+                int(process.name),
+                test.partition("=")[2].rpartition(" ")[0],
+                command.replace("\0", " ").strip(),
+            )
 
 
 def _living_s(pid: int) -> float:

@@ -104,7 +104,7 @@ def test_a_run_ends_in_time_and_names_each_item_that_is_at_fault(tmp_path):
         "test_endless": " too long: ",
         "test_idle": "it hangs: idle for",
         "test_ticking": "it takes too long",
-        "test_leaves": "1 processes are left behind by test_faults.py::test_leaves",
+        "test_leaves": "processes are left behind by test_faults.py::test_leaves: ",
     }
     for name, words in said.items():
         at = [part for part in out.split("\n_____") if f" {name} " in part.partition("\n")[0]]

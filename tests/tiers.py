@@ -173,12 +173,12 @@ class Suite:
 
     def _end_what_is_left(self) -> None:
         left = list(started_by(f"{RUN}={self._name}"))
-        for pid, _ in left:
+        for pid, *_ in left:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
         if left:
-            starters = ", ".join(sorted({test for _, test in left}))
-            pytest.fail(f"{len(left)} processes are left behind by {starters}", pytrace=False)
+            told = "; ".join(f"{test}: {command}" for _, test, command in left)
+            pytest.fail(f"processes are left behind by {told}", pytrace=False)
 
 
 def tier(item: pytest.Item) -> str:
