@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import phy
 from sdrlinkd.link import Lives
 from tests.programs import Daemon
 from tests.tiers import (
@@ -19,6 +20,15 @@ __all__ = ["pytest_collection_modifyitems", "pytest_configure", "pytest_terminal
 ETC = Path(__file__).parents[1] / "etc"
 # A daemon would count this and report it with its ledger.
 Lives.is_strict = True
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile the modem once, before all workers, if its source has changed.
+
+    A daemon that a test starts would take its messages meanwhile, and send none.
+    """
+    if not hasattr(session.config, "workerinput"):
+        phy.warm_up()
 
 
 @pytest.fixture(autouse=True)
