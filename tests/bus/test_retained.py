@@ -41,6 +41,17 @@ def test_the_age_grows_and_what_is_too_old_is_not_given():
     assert message().late(1e6).late
 
 
+def test_what_is_forgotten_leaves_its_room():
+    retention = Retention(most_bytes=4000)
+    for first in range(0, 60, 6):
+        for number in range(first, first + 6):
+            retention.keep((2, number % 6), message(str(number % 6), number), 1)
+        assert numbers(retention) == [*range(first, first + 6)], "as many as at first"
+        retention.forget_topic(5)
+        for topic_id in range(5):
+            retention.forget((2, topic_id))
+
+
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 60)), max_size=40), st.integers(1, 3))
 def test_it_never_keeps_more_than_its_bound(sent, depth):
     retention = Retention(most_bytes=2000)

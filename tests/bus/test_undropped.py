@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from types import SimpleNamespace
 
 import pytest
 import zmq
@@ -98,6 +99,29 @@ async def test_who_does_not_read_at_all_is_given_up_until_it_does(sockets, monke
     await until(read)
     assert got == list(range(20))
     certain.close(1.0)
+
+
+def test_who_reads_slowly_is_not_given_up(sockets, monkeypatch):
+    """Only one who reads nothing at all for that long is."""
+    out, slow, _ = sockets
+    now, calls = [100.0], []
+    stuck_s = getattr(*CONSTANTS["stuck_s"])
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+
+    def call_later(_delay_s, call):
+        calls.append(call)
+        return SimpleNamespace(cancel=lambda: None)
+
+    certain = Undropped(SimpleNamespace(call_later=call_later), out, lambda: None)
+    for frames in numbered(b"slow", range(40)):
+        certain.send(b"slow", frames)
+    got = heard(slow)
+    while len(got) < 40 and calls:
+        now[0] += 0.9 * stuck_s
+        out.get(zmq.EVENTS)  # takes note of the room there is again
+        calls.pop()()
+        got += heard(slow)
+    assert got == list(range(40))
 
 
 async def test_at_the_end_there_is_a_little_time(sockets, monkeypatch):
