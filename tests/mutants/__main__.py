@@ -53,7 +53,8 @@ class Run:
             return True
         paths = [self._root / file for each in self.packages for file in each.files]
         # A child of this process shares its limits with others, and ends what it started itself.
-        session.config.pluginmanager.get_plugin(Suite.NAME).is_strict = False
+        if suite := session.config.pluginmanager.get_plugin(Suite.NAME):
+            suite.is_strict = False
         self._live = Live({path: importlib.import_module(self._module(path)) for path in paths})
         self._trials = Trials(session.items, paths, os.cpu_count() or 1)
         session.config.pluginmanager.register(self._trials)

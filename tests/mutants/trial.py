@@ -20,8 +20,8 @@ MOST_OF_ONE_S = 5.0
 MOST_S = 20.0
 """CPU time in s of the tests that are tried with one mutant."""
 TOO_DEAR = f"takes more than {MOST_OF_ONE_S:.0f} s"
-LEFT_OUT = ("realtime", "slow", "long", "soak", "fresh")
-"""Markers of tests that take long, or start programs, in which nothing is changed."""
+LEFT_OUT = ("realtime", "long", "soak", "fresh")
+"""Markers of tests that take long, or need the machine for themselves."""
 
 
 class TooDearError(BaseException):
