@@ -66,7 +66,7 @@ def test_meter_again(meter):
 def test_never():
     assert never(3) == 0
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_left_out():
     assert Meter().unused == 0
 """
@@ -206,7 +206,7 @@ def test_a_run_tells_which_changes_no_test_noticed(tmp_path):
     (tmp_path / "product" / "sums.py").write_text(PRODUCT)
     (tmp_path / "tests" / "product").mkdir(parents=True)
     (tmp_path / "tests" / "product" / "test_sums.py").write_text(TESTS)
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    slow: long\n")
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long: not here\n")
     (tmp_path / "docs" / "measured").mkdir(parents=True)
     done = subprocess.run(
         [sys.executable, "-m", "tests.mutants", "product", "--keep", "--seed", "3"],
