@@ -100,6 +100,17 @@ def test_one_that_is_clearly_better_takes_over_after_a_second():
     assert fleet.leaders == [7]
 
 
+@pytest.mark.parametrize("less", [0.01, 0.09])
+def test_a_leader_that_hears_less_than_before_goes_on_leading(less):
+    """Its own word counts, whatever it said before."""
+    fleet = Fleet({7: 0.8, 8: 0.85})
+    fleet.run(2.0)
+    fleet.scores[8] -= less
+    fleet.run(8.0)
+    assert {tuple(leaders) for at, leaders in fleet.led if at > 2.0} == {(8,)}
+    assert fleet.elections[7].leader == 8
+
+
 def test_two_that_claim_at_once_agree():
     fleet = Fleet({7: 0.9, 8: 0.9})
     fleet.run(1.0)

@@ -120,6 +120,28 @@ def test_over_a_steady_network_it_is_held_for_little_longer_than_the_leader_need
     assert gateways.each[1].put_twice <= 20
 
 
+@pytest.mark.parametrize(("delay_s", "most_s"), [(0.1, 1.0), (0.3, 0.5)])
+def test_after_a_message_was_put_twice_copies_are_held_for_twice_as_long(delay_s, most_s):
+    """What the leader's put took is learnt as ever; `most_s` bounds what comes of it."""
+    early, patient = Forwarding(), Forwarding()
+    for each in (early, patient):
+        each.heard("odom", name_of(0), "a", 0.0, leads=False)
+    assert early.due(early.due_at) == ["a"]
+    assert not early.passed("odom", name_of(0), delay_s, by_leader=True)
+    assert patient.passed("odom", name_of(0), delay_s, by_leader=True), "dropped in time"
+    assert (early.put_twice, patient.put_twice) == (1, 0)
+    assert early.hold_s == pytest.approx(min(most_s, 2 * patient.hold_s))
+
+
+def test_a_second_put_of_another_that_waits_says_nothing_of_the_leader():
+    forwarding = Forwarding()
+    before_s = forwarding.hold_s
+    forwarding.heard("odom", name_of(0), "a", 0.0, leads=False)
+    forwarding.due(1.0)
+    forwarding.passed("odom", name_of(0), 1.1, by_leader=False)
+    assert (forwarding.put_twice, forwarding.hold_s) == (1, before_s)
+
+
 def test_those_that_wait_for_the_leader_do_not_learn_from_each_other():
     rng = Random(6)
     gateways = Gateways([0.7, 0.8, 0.8, 0.8], lambda: rng.uniform(0.0002, 0.001))

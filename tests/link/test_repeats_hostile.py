@@ -14,7 +14,7 @@ def asked(link, numbers, at, asker=2):
 
 
 def sender(**params):
-    return make_link(1, pdu_size=PDU_SIZE, repeat=RepeatParams(), **params)
+    return make_link(1, **{"pdu_size": PDU_SIZE, "repeat": RepeatParams(), **params})
 
 
 def sent(link, at, n=1, **kinds):
@@ -82,6 +82,25 @@ def test_no_robot_takes_all_places():
     before = link.report(0.0).repeats.refused
     asked(link, numbers[-1:], 0.02, asker=2)
     assert link.report(0.0).repeats.refused == before
+
+
+def test_who_got_least_comes_first():
+    """Though it lacks a later PDU, and not all fit into the burst."""
+    link = sender(repeat=RepeatParams(share=1.0))
+    numbers = [number for burst in sent(link, 0.0, n=40) for number in burst.numbers]
+
+    def repeated(at):
+        again = next_burst(link, at)
+        link.confirm(again, Outcome.SENT, at)
+        return [kept.number for kept in again.repeated.kept]
+
+    asked(link, numbers[:1], 0.01, asker=2)
+    assert repeated(0.05) == numbers[:1]
+    asked(link, numbers[1:30], 0.06, asker=2)
+    asked(link, numbers[35:36], 0.06, asker=3)
+    first = repeated(0.1)
+    assert 1 < len(first) < 29
+    assert first == [*numbers[1 : len(first)], numbers[35]]
 
 
 def test_questions_of_others_do_not_use_up_ours():

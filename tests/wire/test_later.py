@@ -8,6 +8,7 @@ from sdrlinkd.wire import (
     CONTROL_TOPIC_ID,
     MAX_AGE_US,
     Beacon,
+    Clock,
     Entry,
     Frame,
     LinkReport,
@@ -18,6 +19,7 @@ from sdrlinkd.wire import (
     Stamp,
     build,
     build_records,
+    depends_on_start,
     parse,
     parse_records,
     postponed,
@@ -36,6 +38,7 @@ records = st.one_of(
     st.builds(Repeat, octet, st.integers(0, MAX_AGE_US), u16, octet),
     st.builds(LinkReport, octet, st.integers(-128, 127), octet, octet),
     st.tuples(octet, octet, octet).map(lambda fields: Receipt(*fields)),
+    st.tuples(u16, octet, octet, times_us).map(lambda fields: Clock(*fields, pdu_number=fields[0])),
     st.builds(RegistryDigest, st.binary(min_size=8, max_size=8), st.binary(max_size=15)),
 )
 units_us = times_us.map(lambda us: us // 100 * 100)
@@ -88,6 +91,13 @@ def test_ages_and_phases_move_and_nothing_else(case, by_us):
         assert parse_records(control.payload) == [moved(record, by_us) for record in told]
     else:
         assert after == pdu
+
+
+@law(120)
+@given(built())
+def test_what_tells_the_time_of_its_own_start_fits_that_start_alone(case):
+    pdu, _, _, told = case
+    assert depends_on_start(pdu) == any(isinstance(record, Frame | Clock) for record in told)
 
 
 @law(40)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.wire import Entry, Reassembly, ReassemblyLimits
+from sdrlinkd.wire import Entry, Parity, Reassembly, ReassemblyLimits
 from tests.laws import law
 
 SEED = 53
@@ -373,6 +373,61 @@ def test_memory_is_not_more_than_accounted_for(payload_size, per_message):
     finally:
         tracemalloc.stop()
     assert used <= reassembly.held_bytes
+
+
+PARITY = Parity(3, 7, 3, 2, 0, 0, 10, 25, bytes(10))
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"n_parity": 3, "number": 1},
+        {"k": 11, "number": 1},
+        {"size": 26, "number": 1},
+        {"total": 4, "number": 1},
+        {"data": bytes(9), "number": 1},
+        {"number": 0},
+        {"topic_id": 4, "number": 1},
+        {"entry_id": 8, "number": 1},
+    ],
+)
+def test_parity_that_does_not_fit_what_is_held_is_not_kept(other):
+    """A message would be computed from pieces that do not belong together."""
+    reassembly = make()
+    reassembly.add(1, Entry(3, 7, 0, 3, bytes(10)), 0.0)
+    assert reassembly.hold(1, PARITY, 0.0) is not None
+    before = reassembly.held_bytes
+    assert reassembly.hold(1, PARITY._replace(**other), 0.5) is None
+    assert reassembly.hold(2, PARITY._replace(number=1), 0.5) is None, "of another robot"
+    assert reassembly.held_bytes == before
+    reassembly.expire(0.9)
+    held = reassembly.hold(1, PARITY._replace(number=1), 0.9)
+    assert held.parity == {0: {0: PARITY.data, 1: PARITY.data}}
+    assert held.shape == (2, 10, 25)
+
+
+def test_parity_alone_and_parity_of_what_is_silent_is_not_kept():
+    reassembly = make(timeout_s=1.0)
+    assert reassembly.hold(1, PARITY, 0.0) is None
+    reassembly.add(1, Entry(3, 7, 0, 3, bytes(10)), 0.0)
+    assert reassembly.hold(1, PARITY, 1.0) is None
+    reassembly.expire(1.0)
+    assert reassembly.held == reassembly.held_bytes == 0
+
+
+def test_parity_is_a_sign_of_life_and_takes_as_much_room_as_a_fragment():
+    reassembly = make(timeout_s=1.0)
+    reassembly.add(1, Entry(3, 7, 0, 9, bytes(10)), 0.0)
+    sizes = [reassembly.held_bytes]
+    reassembly.add(1, Entry(3, 7, 1, 9, bytes(10)), 0.5)
+    sizes.append(reassembly.held_bytes)
+    reassembly.hold(1, PARITY._replace(total=9), 0.9)
+    sizes.append(reassembly.held_bytes)
+    assert sizes[2] - sizes[1] == sizes[1] - sizes[0]
+    reassembly.expire(1.8)
+    assert reassembly.held == 1
+    reassembly.expire(1.9)
+    assert reassembly.held == reassembly.held_bytes == 0
 
 
 def test_no_fragment_joins_a_message_past_its_timeout():

@@ -182,7 +182,7 @@ class Answers:
     def group(self, due: Iterable[Wanted], start: float, most: int) -> RepeatGroup | None:
         """Up to `most` of the PDUs that are `due`, to be repeated in a burst at `start`.
 
-        The robot for which least was repeated comes first.
+        The robot for which least was repeated comes first, also where fewer fit.
         """
         found = []
         for each in due:
@@ -207,7 +207,7 @@ class Answers:
             for each in known or found
             if (each.kept.src, each.kept.qos, each.kept.mcs) == (first.src, first.qos, first.mcs)
         ]
-        chosen = sorted(like[:most], key=lambda kept: kept.number)
+        chosen = like[:most]
         mcs = self._slower[first.mcs] if first.mcs < len(self._slower) else first.mcs
         n_known = len(chosen) if known else 0
         return RepeatGroup(chosen, first.qos, mcs, first.src != self._own_id, n_known)

@@ -25,7 +25,7 @@ class Wanted:
 
 
 class RepeatGroup(NamedTuple):
-    """PDUs to be repeated in one burst: of one source, class and MCS."""
+    """PDUs to be repeated in one burst, the first choice first: of one source, class and MCS."""
 
     kept: list[Kept]
     qos: Qos
@@ -35,8 +35,8 @@ class RepeatGroup(NamedTuple):
     """How many of them, the first ones, a REPEAT of an earlier burst announces."""
 
     def first(self, n: int) -> "RepeatGroup":
-        """The first `n` of them."""
-        return self._replace(kept=self.kept[:n])
+        """The first `n` of them, in the order of their numbers."""
+        return self._replace(kept=sorted(self.kept[:n], key=lambda kept: kept.number))
 
     def alive(self, start: float) -> "RepeatGroup":
         """Those that hold a message that is not too old at `start`."""
