@@ -74,7 +74,7 @@ def test_the_clients_is_a_part_of_the_daemons(wheels):
     assert {"sdrlinkd/__init__.py", "sdrlinkd/client/publisher.py"} <= ours <= daemon
 
 
-@pytest.mark.parametrize("order", permutations((0, 1)))
+@pytest.mark.parametrize("order", [*permutations((0, 1))])
 @pytest.mark.parametrize("removed", ["sdrlinkd", "sdrlinkd-client"])
 def test_both_in_one_environment_come_and_go_without_each_other(wheels, pip, found, order, removed):
     install = ("install", "--no-deps", "--no-compile")

@@ -14,6 +14,8 @@ import websocket
 from tests.programs import sdrlinkctl
 from tests.web.conftest import page_of
 
+pytestmark = pytest.mark.slow
+
 SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
 
 
