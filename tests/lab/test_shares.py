@@ -4,6 +4,7 @@ import pytest
 
 from sdrlinkd.link import Told
 from tests.lab.saturated import saturated, usrp
+from tests.laws import one_in
 
 pytestmark = pytest.mark.slow
 FILE = Told("robot.toml", ())
@@ -19,7 +20,7 @@ CLOSE = {"minislot": 0.05, "tdma": 0.08, "csma": 0.5}
 
 
 @pytest.mark.parametrize("policy", CLOSE)
-@pytest.mark.parametrize("radio", RADIOS)
+@pytest.mark.parametrize("radio", one_in(2, RADIOS))
 def test_the_share_that_is_told_is_the_share_that_is_carried(policy, radio):
     n = 3
     sim, carried = saturated(policy, n, seed=n, **RADIOS[radio])

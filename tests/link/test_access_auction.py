@@ -11,7 +11,7 @@ from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import Qos, Sensed
 from sdrlinkd.link.access import Contest, Waiting, Wish, make_access, make_auction, n_bits
 from sdrlinkd.wire import Want
-from tests.laws import law
+from tests.laws import law, one_in
 from tests.link.pulsing import FAST, PulsingAir
 from tests.link.radios import LOCKSTEP, params
 
@@ -123,7 +123,7 @@ def test_whoever_misses_a_burst_does_not_clash(n, miss):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("per_s", [5, 50, 500])
+@pytest.mark.parametrize("per_s", one_in(2, [5, 500, 50]))
 def test_foreign_energy_as_short_as_a_pulse_costs_air_and_silences_nobody(per_s):
     air = make_air(4, 5)
     air.saturate(400, qos=Qos.BULK)
@@ -285,7 +285,7 @@ def test_what_was_told_and_is_gone_is_not_sent_for_later():
         air.assert_nobody_clashes()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_something_urgent_of_a_robot_with_bulk_waits_for_nobodys_default():
     """Its bulk was told, and nobody was silent for longer, so it is next; but others challenge."""
     n, until_s = 8, SETTLED_S + 10

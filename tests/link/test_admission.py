@@ -197,7 +197,7 @@ def test_the_lowest_class_gives_way_and_comes_back():
     assert all_agree(air) == {(2, 0): True}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_equal_newcomer_waits_and_a_planner_that_goes_leaves_the_word_behind():
     air = team(robots=(1, 2, 3), hears={(a, b) for a in (1, 2, 3) for b in (1, 2, 3) if a != b})
     air.run(2.0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sdrlinkd.link import Qos
 from sdrlinkd.link.access import Ticks, Times, Waiting, account, shares
-from tests.laws import law
+from tests.laws import law, one_in
 from tests.link.pulsing import FAST, PulsingAir
 from tests.link.turns import LONGEST_S, PDU_S, Team
 
@@ -130,7 +130,7 @@ def turns_s(team, since):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("root_too", [False, True])
+@pytest.mark.parametrize("root_too", one_in(2, [False, True]))
 def test_with_turns_those_who_always_want_urgent_share_the_air(root_too):
     chatty = (1, 2, 4) if root_too else (2, 4, 5)
     team = team_of(6, chatty, FORMED_S, FORMED_S + 8)
@@ -143,7 +143,7 @@ def test_with_turns_those_who_always_want_urgent_share_the_air(root_too):
     assert max(used_s[node] for node in chatty) < 1.3 * min(used_s[node] for node in chatty)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_with_turns_an_urgent_message_now_and_then_goes_before_those_that_always_come():
     """It takes eight PDUs, so it does not fit a least turn. The others still have theirs."""
     team, one, n = team_of(6, (2, 4), FORMED_S, FORMED_S + 8), 6, 8
@@ -166,7 +166,7 @@ def named(access, now):
             if " has wanted urgent" in text}  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_in_an_auction_it_is_named_until_it_stops():
     air, end_s = auction(4), SETTLED_S + 12
     always(air, [2], SETTLED_S, end_s)
@@ -187,7 +187,7 @@ def test_in_an_auction_it_is_named_until_it_stops():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("who", [1, 3])
+@pytest.mark.parametrize("who", one_in(2, [1, 3]))
 def test_with_turns_it_is_named_until_it_stops(who):
     """Robot 1 plans. It tells no requests, so the others do not know its own."""
     team, end_s = team_of(4, [who], FORMED_S, FORMED_S + 12), FORMED_S + 12

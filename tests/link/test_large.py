@@ -213,7 +213,7 @@ def test_any_octets_as_parts_are_dropped_or_joined(sent):
     assert rx(receiver).held == 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_between_two_parts_it_ends_with_no_entry_id():
     """A message that expires there has given its id back once."""
     sender, _ = pair()
