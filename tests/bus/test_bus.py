@@ -1,6 +1,7 @@
 """The bus beside programs: what is taken, what is refused and why, and who hears what."""
 
 import asyncio
+import os
 from math import inf
 
 import msgspec
@@ -13,12 +14,14 @@ from sdrlinkd.link import (
     AS_CONFIGURED,
     Delivered,
     HeardTopic,
+    MessageName,
     Overrides,
     Qos,
     Retain,
     TopicPolicy,
     Verdict,
 )
+from sdrlinkd.localtime import LocalTimes
 from sdrlinkd.wire import Topic
 from tests.bus.programs import EMPTY, Beside
 
@@ -29,6 +32,29 @@ MOST = 1000
 KEPT = Retain(8, inf)
 
 
+@pytest.mark.parametrize(
+    ("more", "key", "over"),
+    [
+        ("[bus]\nmax_message_bytes = 1000\n", "bus.max_message_bytes = 1000", "tx_too_big"),
+        ("[topic.odom]\nmax_bytes = 99\n", "topic.odom.max_bytes = 99", "tx_size_cap"),
+        ("[link]\npdu_size = 64\n", "link.pdu_size = 64", "tx_too_big"),
+        ("[queue]\nmax_bytes = 5000\n", "queue.max_bytes = 5000", "tx_overflow_new"),
+    ],
+)
+async def test_the_announcement_says_which_setting_limits_a_message(tmp_path, more, key, over):
+    beside = Beside(tmp_path, more)
+    try:
+        takes = (await beside.program().subscribe())["takes"]["/robot_1/odom"]
+        assert takes["key"].startswith(key)
+        assert takes["over"] == over
+        if "pdu_size" in more:
+            assert takes["most"] == beside.setup.largest
+        else:
+            assert takes["most"] == int(key.split()[-1])
+    finally:
+        beside.close()
+
+
 @pytest.fixture
 async def beside(tmp_path):
     beside = Beside(tmp_path, f"rx_depth = 4\n[bus]\nmax_message_bytes = {MOST}\n")
@@ -36,8 +62,8 @@ async def beside(tmp_path):
     beside.close()
 
 
-def from_air(number=1, topic=MAP, name="map", src=2, payload=CDR, **more):
-    heard = HeardTopic(topic, name, "nav_msgs/msg/OccupancyGrid")
+def from_air(number=1, topic=MAP, called="map", src=2, payload=CDR, **more):
+    heard = HeardTopic(topic, called, "nav_msgs/msg/OccupancyGrid")
     fields = {"lost_pdus": 0, "origin_at": None, "heard_at": 0.0, "hops_left": 0, "snr_db": None}
     fields |= {"series": topic, "topic": heard}
     return Delivered(src, topic, payload, number, **{**fields, **more})
@@ -219,6 +245,29 @@ async def test_a_message_from_the_air_reaches_those_who_want_it(beside):
     assert beside.bus.filters == {b"/rx_robot_3/"}
 
 
+async def test_the_header_tells_what_is_known_of_a_message(beside):
+    program = beside.program()
+    await program.subscribe(b"/rx_robot_")
+    name = MessageName(9, 5, 70_000, 3, is_numbered=True)
+    heard = from_air(
+        4, series=201, lost_pdus=7, hops_left=2, snr_db=12.5, origin_at=10.0, began_at=10.25,
+        heard_at=10.75, ended_at=11.5, name=name,
+    )  # fmt: skip
+    beside.bus.publish(heard, 2.0, 77, LocalTimes(1, 2, 3, 4))
+    beside.bus.publish(heard._replace(name=name._replace(is_numbered=False)), None, 78)
+    beside.bus.publish(from_air(1), None, 79)
+    full, unaged, plain = [program.read(each) for each in await program.all()]
+    assert full == {
+        "s": 2, "n": 4, "tr": 77, "ty": "nav_msgs/msg/OccupancyGrid", "g": 7, "h": 2,
+        "age": 2_000_000, "sn": 12.5, "tl": 1, "eb": 2, "ts": 3, "es": 4, "dw": 250_000,
+        "dr": 500_000, "da": 750_000, "b": 9, "e": 5, "pn": 70_000, "ps": 3, "sr": 201,
+    }  # fmt: skip
+    unknown = {"age", "tl", "eb", "ts", "es", "dw", "dr", "da", "pn"}
+    assert unaged.keys() == full.keys() - unknown | {"sq"}
+    assert unaged["sq"] == 70_000
+    assert "sr" not in plain
+
+
 async def test_who_wants_everything_is_no_consumer_of_its_own(beside):
     program = beside.program()
     await program.subscribe(b"")
@@ -246,7 +295,7 @@ async def test_what_is_kept_comes_to_those_who_ask_later(beside):
     program = beside.program()
     for number in range(1, 5):
         beside.bus.publish(from_air(number), None, 77, retain=Retain(3, inf))
-    beside.bus.publish(from_air(5, topic=ODOM, name="odom"), None, 77)
+    beside.bus.publish(from_air(5, topic=ODOM, called="odom"), None, 77)
     beside.bus.publish(from_air(6, src=3), None, 77, retain=KEPT)
     beside.bus.publish(from_air(7, src=4), 5.0, 77, retain=Retain(8, 4.0))
     assert await late(program) == [(n, None, True) for n in (2, 3, 4, 6)], "one is too old"
@@ -260,7 +309,7 @@ async def test_what_is_kept_comes_to_those_who_ask_later(beside):
 async def test_a_topic_that_is_no_longer_latched_keeps_nothing(beside):
     program = beside.program()
     beside.bus.publish(from_air(1), None, 77, retain=KEPT)
-    beside.bus.publish(from_air(2, topic=ODOM, name="odom"), None, 77, retain=KEPT)
+    beside.bus.publish(from_air(2, topic=ODOM, called="odom"), None, 77, retain=KEPT)
     beside.bus.announce({MAP: TopicPolicy(durability="transient_local")})
     assert [n for n, *_ in await late(program)] == [1]
 
@@ -268,9 +317,9 @@ async def test_a_topic_that_is_no_longer_latched_keeps_nothing(beside):
 async def test_a_changed_name_is_used_from_the_next_message_on(beside):
     program = beside.program()
     await program.subscribe(b"/rx_robot_2/")
-    beside.bus.publish(from_air(1, topic=200, name="arm"), None, 77)
+    beside.bus.publish(from_air(1, topic=200, called="arm"), None, 77)
     beside.bus.forget_topics([(2, 200)])
-    beside.bus.publish(from_air(1, topic=200, name="leg"), None, 77)
+    beside.bus.publish(from_air(1, topic=200, called="leg"), None, 77)
     assert [each[0] for each in await program.all()] == [b"/rx_robot_2/arm\0", b"/rx_robot_2/leg\0"]
 
 
@@ -328,6 +377,17 @@ async def test_what_has_arrived_is_taken_before_producers_are_closed(beside):
         await program.out.send_multipart([b"/robot_1/odom\0", EMPTY, CDR])
     await beside.bus.stop_ingress()
     assert len(beside.ingress.taken) == 300
+
+
+async def test_after_its_end_its_descriptors_are_free_for_others(tmp_path):
+    loop = asyncio.get_running_loop()
+    Beside(tmp_path).close()
+    pipes = [os.pipe() for _ in range(20)]
+    for read, write in pipes:
+        loop.add_reader(read, lambda: None)
+        loop.remove_reader(read)
+        os.close(read)
+        os.close(write)
 
 
 async def test_nobody_comes_while_it_does_not_listen(beside):

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sdrlinkd.bus import shown
 from sdrlinkd.bus.testing import OutHeader, decode, encode
 from sdrlinkd.client import pack_map
 from sdrlinkd.errors import EnvelopeError
@@ -74,3 +75,10 @@ def test_out_header_leaves_out_what_is_unknown():
     frames = encode(TOPIC, header, CDR)
     assert frames[0] == TOPIC
     assert msgspec.msgpack.decode(frames[1][1:]) == {"s": 1, "n": 2, "tr": 3, "ty": "a/msg/B"}
+
+
+@pytest.mark.parametrize("size", [0, 1, 239, 240, 241, 1000])
+def test_words_of_others_are_cut_to_what_can_be_shown(size):
+    words = "x\n" * (size // 2) + "x" * (size % 2)
+    plain = words.replace("\n", "?")
+    assert shown(words) == (plain if size <= 240 else plain[:239] + "…")

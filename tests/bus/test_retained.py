@@ -41,6 +41,14 @@ def test_the_age_grows_and_what_is_too_old_is_not_given():
     assert message().late(1e6).late
 
 
+def test_the_bound_itself_may_be_kept():
+    """A message counts 512 octets more than its payload."""
+    retention = Retention(most_bytes=2 * (8 + 512))
+    for number in range(1, 4):
+        retention.keep((2, number), message(str(number), number), 1)
+        assert numbers(retention) == [1, 2, 3][max(0, number - 2) : number]
+
+
 def test_what_is_forgotten_leaves_its_room():
     retention = Retention(most_bytes=4000)
     for first in range(0, 60, 6):

@@ -104,7 +104,7 @@ async def test_who_does_not_read_at_all_is_given_up_until_it_does(sockets, monke
 def test_who_reads_slowly_is_not_given_up(sockets, monkeypatch):
     """Only one who reads nothing at all for that long is."""
     out, slow, _ = sockets
-    now, calls = [100.0], []
+    now, calls, used = [100.0], [], []
     stuck_s = getattr(*CONSTANTS["stuck_s"])
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
 
@@ -112,15 +112,17 @@ def test_who_reads_slowly_is_not_given_up(sockets, monkeypatch):
         calls.append(call)
         return SimpleNamespace(cancel=lambda: None)
 
-    certain = Undropped(SimpleNamespace(call_later=call_later), out, lambda: None)
+    loop = SimpleNamespace(call_later=call_later)
+    certain = Undropped(loop, out, lambda: used.append(now[0]))
     for frames in numbered(b"slow", range(40)):
         certain.send(b"slow", frames)
     got = heard(slow)
     while len(got) < 40 and calls:
-        now[0] += 0.9 * stuck_s
+        now[0] += stuck_s
         out.get(zmq.EVENTS)  # takes note of the room there is again
         calls.pop()()
         got += heard(slow)
+        assert used[-1] == now[0], "who reads the socket is told of each use"
     assert got == list(range(40))
 
 

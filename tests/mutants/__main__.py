@@ -24,7 +24,7 @@ from tests.mutants.trial import Mutant, Trials
 from tests.tiers import Suite
 
 LEDGER = Path("docs/measured/mutants.json")
-QUIETLY = ("-qq", "-s", "-p", "no:cacheprovider", "-p", "no:xdist", "--timeout=0", "--assert=plain")
+QUIETLY = ("-qq", "-s", "-p", "no:cacheprovider", "-p", "no:xdist", "--assert=plain")
 EVERY = 20
 """After how many mutants a line tells how far it is."""
 
@@ -56,9 +56,9 @@ class Run:
         if suite := session.config.pluginmanager.get_plugin(Suite.NAME):
             suite.is_strict = False
         self._live = Live({path: importlib.import_module(self._module(path)) for path in paths})
-        self._trials = Trials(session.items, paths, os.cpu_count() or 1)
+        self._trials = Trials(session.items, paths, os.cpu_count() or 1, self._root)
         session.config.pluginmanager.register(self._trials)
-        left_out = self._trials.learn()
+        left_out = self._trials.learn(self._say)
         tests = self._trials.tests
         self._say(f"{len(tests)} tests, {sum(test.cpu_s for test in tests):.0f} s of CPU time")
         for name in left_out:

@@ -1,11 +1,15 @@
 """The trials: which tests reach a line, and whether one of them fails with a change."""
 
+import gc
+import pickle
 import signal
+import sys
 import time
 from bisect import bisect
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
 from itertools import accumulate, zip_longest
 from pathlib import Path
 from types import FrameType
@@ -22,6 +26,13 @@ MOST_S = 20.0
 TOO_DEAR = f"takes more than {MOST_OF_ONE_S:.0f} s"
 LEFT_OUT = ("realtime", "long", "soak", "fresh")
 """Markers of tests that take long, or need the machine for themselves."""
+STARTS = "start_daemon"
+"""Fixture of tests that start programs, in which nothing is changed."""
+EVERY = 20
+"""After how many files of tests a line tells how far it is."""
+
+Reached = tuple[float, str, set[tuple[str, int]]]
+"""CPU time in s, why a test cannot be used ("" if it can), and the lines that it reaches."""
 
 
 class TooDearError(BaseException):
@@ -59,14 +70,47 @@ class Mutant:
         self.n_cut, self.tests = len(self.tests[n:]), self.tests[:n]
 
 
+class Learnt:
+    """What the tests of a file reach, kept for as long as neither product nor tests change."""
+
+    def __init__(self, root: Path, sources: Sequence[str]) -> None:
+        self._folder = root / "build" / "mutants"
+        self._common = sha256(repr((sys.version, sources)).encode())
+        for folder in ("sdrlinkd", "phy", "backends", "tests"):
+            for path in sorted((root / folder).rglob("*.py")):
+                if not path.name.startswith("test_"):
+                    self._common.update(path.read_bytes())
+
+    def of(self, items: Sequence[pytest.Item]) -> list[Reached] | None:
+        """What was kept of the items of a file, None if nothing was."""
+        path = self._path(items)
+        return pickle.loads(path.read_bytes()) if path.exists() else None
+
+    def keep(self, items: Sequence[pytest.Item], found: Sequence[Reached]) -> None:
+        """Keep it, unless something failed, which may have been the machine's fault."""
+        if found and all(failed in ("", TOO_DEAR) for _, failed, _ in found):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            self._path(items).write_bytes(pickle.dumps(found))
+
+    def _path(self, items: Sequence[pytest.Item]) -> Path:
+        about = self._common.copy()
+        about.update(items[0].path.read_bytes())
+        about.update(repr([item.nodeid for item in items]).encode())
+        return self._folder / about.hexdigest()
+
+
 class Trials:
     """Runs the items that pytest has collected, again and again, in children."""
 
-    def __init__(self, items: Sequence[pytest.Item], sources: Sequence[Path], n: int) -> None:
+    def __init__(
+        self, items: Sequence[pytest.Item], sources: Sequence[Path], n: int, root: Path
+    ) -> None:
         self._items = [
             item for item in items
             if not any(item.get_closest_marker(name) for name in LEFT_OUT)
+            and STARTS not in getattr(item, "fixturenames", ())
         ]  # fmt: skip
+        self._root = root
         self._sources = [str(each) for each in sources]
         self._n = n
         self._failed: list[str] = []
@@ -78,15 +122,23 @@ class Trials:
         if report.failed:
             self._failed.append(report.nodeid)
 
-    def learn(self) -> list[str]:
+    def learn(self, say: Callable[[str], None]) -> list[str]:
         """Learn what each test reaches; returns the names of those left out, and why."""
         by_file = defaultdict(list)
         for item in self._items:
             by_file[item.path].append(item)
+        learnt = Learnt(self._root, self._sources)
+        known = {path: learnt.of(items) for path, items in by_file.items()}
+        unknown = [items for path, items in by_file.items() if known[path] is None]
         left_out = []
-        for items, found in in_children(by_file.values(), self._learn_of, self._n):
+        for n, (items, found) in enumerate(in_children(unknown, self._learn_of, self._n), 1):
+            known[items[0].path] = found
+            learnt.keep(items, found or ())
+            if n % EVERY == 0:
+                say(f"{n} of {len(unknown)} files of tests learnt")
+        for path, items in by_file.items():
             for item, (cpu_s, failed, lines) in zip_longest(
-                items, found or (), fillvalue=(0.0, "ends", set())
+                items, known[path] or (), fillvalue=(0.0, "ends", set())
             ):
                 if failed:
                     left_out.append(f"{item.nodeid} ({failed})")
@@ -97,11 +149,13 @@ class Trials:
 
     def judge(self, mutants: Iterable[Mutant]) -> Iterator[tuple[Mutant, str]]:
         """Each mutant and the test that fails, "time" if it had to be ended, "" if it survives."""
+        # Children share what is there; none looks through it for garbage.
+        gc.freeze()
         for mutant, failed in in_children(mutants, self._try, self._n):
             yield mutant, "time" if failed is None else failed
 
-    def _learn_of(self, items: list[pytest.Item]) -> list[tuple[float, str, set[tuple[str, int]]]]:
-        """(CPU time, why it cannot be used, lines) of each item of a file."""
+    def _learn_of(self, items: list[pytest.Item]) -> list[Reached]:
+        """What is learnt of each item of a file."""
         limit(60 + MOST_OF_ONE_S * len(items))
         signal.signal(signal.SIGPROF, _too_dear)
         measured = coverage.Coverage(data_file=None, config_file=False, include=self._sources)
@@ -125,8 +179,9 @@ class Trials:
         lines = defaultdict(set)
         for file in data.measured_files():
             for line, contexts in data.contexts_by_lineno(file).items():
+                place = (file, line)
                 for context in contexts:
-                    lines[context].add((file, line))
+                    lines[context].add(place)
         return [(*each, lines[item.nodeid]) for item, each in zip(items, found, strict=True)]
 
     def _try(self, mutant: Mutant) -> str:
