@@ -33,7 +33,7 @@ MISSED = {
 # Rows of recordings that are not available everywhere.
 OPTIONAL = {"ptp_over_wifi_strays_ms"}
 # These take a few seconds; the others are for the long tier.
-SMALL = {"access", "repeats", "sealing", "phy_per"}
+SMALL = {"repeats", "sealing"}
 # Why a benchmark cannot run here, if so.
 LACKING = {"radio": no_test_radio, "flowgraphs": no_gnu_radio, "adapters": no_rclpy}
 # Peers take long, and need the machine to themselves.

@@ -71,7 +71,6 @@ class Suite:
         self._begin_s, self._shared_s = 0.0, 0.0
         self._begin = time.monotonic()
         self._costs: dict[str, Cost] = {}
-        self._workers_s = 0.0
         self.is_strict = True
         """Whether items that cost too much, hang, or leave processes, fail."""
         self._watchdog = Watchdog()
@@ -125,17 +124,6 @@ class Suite:
             if name == "cost":
                 self._costs[report.nodeid] = Cost(**cost)
 
-    @pytest.hookimpl(trylast=True)
-    def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """A worker tells what it has spent, collection included."""
-        if hasattr(session.config, "workeroutput"):
-            session.config.workeroutput["spent_s"] = spent_s()
-
-    @pytest.hookimpl(optionalhook=True)
-    def pytest_testnodedown(self, node: object) -> None:
-        """Hear that from a worker, unless it crashed."""
-        self._workers_s += getattr(node, "workeroutput", {}).get("spent_s", 0.0)
-
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """Report the dearest items, the sum by tier, and each item that was skipped."""
         if not self._costs:
@@ -148,7 +136,8 @@ class Suite:
             write(f"  {cost.all_s:6.1f} {cost.tier:8} {name}{shared}")
         sums = by_tier(self._costs.values())
         write("; ".join(f"{name}: {n} items, {cpu_s:.0f} CPU s" for name, n, cpu_s in sums))
-        spent, wall = spent_s() + self._workers_s, time.monotonic() - self._begin
+        # All workers descend from this process.
+        spent, wall = spent_s(), time.monotonic() - self._begin
         write(f"in all {spent:.0f} CPU s, collection included, in {wall:.0f} s by the clock")
         if (slow := slowness()) > SLOW:
             write(f"this machine computes {slow:.1f} times as slowly as usual")

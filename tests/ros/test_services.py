@@ -3,8 +3,11 @@
 import pytest
 
 from tests.ros.programs import Agent
+from tests.ros.rough_air import air, hub, world
 from tests.ros.team import WAIT_S, Robot, config
 from tests.waiting import wait_for
+
+__all__ = ["air", "hub", "world"]
 
 pytestmark = pytest.mark.realtime
 
