@@ -69,10 +69,21 @@ class Robot:
         wait_for(lambda: self.node.count(topic="/link/topics") > 0, WAIT_S)
         wait_for(lambda: any(topic == t and text in s for t, s in self.states()), WAIT_S)
 
+    def superseded(self, topic):
+        """How many messages of a topic were replaced by newer ones: a busy machine has such."""
+        topics = self.daemon.snapshot().link.topics
+        return sum(each.dropped.get("tx_superseded", 0) for each in topics if each.name == topic)
+
     @property
     def samples_lost(self):
         counters = ask(self.daemon, "status")["carrier"]["counters"]
         return sum(counters[name] for name in ("overflows", "samples_lost", "bursts_missed"))
+
+
+def is_part(some, whole):
+    """Whether `some` is `whole` in its order, of which messages may be missing."""
+    rest = iter(whole)
+    return all(each in rest for each in some)
 
 
 def matched(robot, *topics, n=1):
