@@ -1,11 +1,17 @@
 """The command `top`: the link, live."""
 
+import asyncio
+import signal
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sdrlinkd.cli.app import RuntimeDir, app
 from sdrlinkd.cli.following import Follower
+from sdrlinkd.cli.stopping import stopped_by_signals
 from sdrlinkd.errors import UserError
+
+if TYPE_CHECKING:
+    from sdrlinkd.cli.top.live import TopApp
 
 
 @app.command()
@@ -21,4 +27,16 @@ def top(runtime_dir: RuntimeDir = None) -> None:
             return once.ask(verb, arguments)
 
     with Follower(runtime_dir) as follower:
-        TopApp(follower.look, ask, lambda: follower.waiting).run()
+        screen = TopApp(follower.look, ask, lambda: follower.waiting)
+        asyncio.run(_show(screen))
+    if screen.return_code:
+        sys.exit(screen.return_code)
+
+
+async def _show(screen: "TopApp") -> None:
+    """Show the screen until somebody leaves it or ends the program.
+
+    A signal is the loop's: an exception of its handler would be lost in a callback of the screen.
+    """
+    with stopped_by_signals(lambda: screen.exit(return_code=128 + signal.SIGTERM)):
+        await screen.run_async()
