@@ -16,7 +16,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, settings
 
 from tests.mutants.changes import Change
-from tests.mutants.draw import PACKAGES, Package, shares
+from tests.mutants.draw import PACKAGES, Package, measured, shares
 from tests.mutants.ledger import Ledger, Row
 from tests.mutants.live import Live
 from tests.mutants.planted import PLANTED, Planted
@@ -56,9 +56,10 @@ class Run:
         if suite := session.config.pluginmanager.get_plugin(Suite.NAME):
             suite.is_strict = False
         self._live = Live({path: importlib.import_module(self._module(path)) for path in paths})
-        self._trials = Trials(session.items, paths, os.cpu_count() or 1, self._root)
+        folders = measured(self.packages, self._root)
+        self._trials = Trials(session.items, folders, os.cpu_count() or 1, self._root)
         session.config.pluginmanager.register(self._trials)
-        left_out = self._trials.learn(self._say)
+        left_out = self._trials.learn({str(path) for path in paths}, self._say)
         tests = self._trials.tests
         self._say(f"{len(tests)} tests, {sum(test.cpu_s for test in tests):.0f} s of CPU time")
         for name in left_out:
@@ -106,9 +107,9 @@ class Run:
                     cut = f" ({mutant.n_cut} tests cut)" if mutant.n_cut else ""
                     tests = f"{len(mutant.tests)} tests{cut}" if mutant.tests else "no test there"
                     say(f"survives: {change} [{tests}]{f': {reason}' if reason else ''}")
-            case Planted(name=name, law=law):
-                self.planted[name] = failed
-                say(f"{name}, {law}: {failed or 'survives'}")
+            case Planted(name=name, law=law, reason=reason):
+                self.planted[name] = failed or (f"survives: {reason}" if reason else "")
+                say(f"{name}, {law}: {self.planted[name] or 'survives'}")
             case package if failed:
                 self.is_sound = False
                 say(f"{package}: {failed} fails where nothing is changed")
@@ -176,7 +177,8 @@ def main(arguments: list[str]) -> int:
         possible = [change for each in packages for change in each.changes]
         ledger.take(asked.seed, run.rows, possible, run.tried, run.planted)
         ledger.keep(LEDGER)
-    return 0 if all(row.is_enough for row in run.rows.values()) else 1
+    is_enough = all(row.is_enough for row in run.rows.values()) and all(run.planted.values())
+    return 0 if is_enough else 1
 
 
 if __name__ == "__main__":
