@@ -42,8 +42,8 @@ class Run:
         self.rows = {each.name: Row(each.n_lines) for each in packages}
         self.tried: dict[Change, str] = {}
         self.planted: dict[str, str] = {}
-        self.is_sound = False
-        """Whether the tests pass where nothing is changed."""
+        self.is_whole = False
+        """Whether it has ended, and the tests pass where nothing is changed."""
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
@@ -64,11 +64,12 @@ class Run:
         self._say(f"{len(tests)} tests, {sum(test.cpu_s for test in tests):.0f} s of CPU time")
         for name in left_out:
             say(f"  left out: {name}")
-        self.is_sound = True
+        is_sound = True
         for n, (mutant, failed) in enumerate(self._trials.judge(self._mutants()), 1):
-            self._judged(mutant, failed)
+            is_sound &= self._judged(mutant, failed)
             if n % EVERY == 0:
                 self._say(f"{n} of about {sum(self._shares)}")
+        self.is_whole = is_sound
         return True
 
     def _mutants(self) -> Iterator[Mutant]:
@@ -91,7 +92,8 @@ class Run:
                 reaching = [test for test in beside if test.reaches(path, change.lines)]
                 yield Mutant(change, make, reaching)
 
-    def _judged(self, mutant: Mutant, failed: str) -> None:
+    def _judged(self, mutant: Mutant, failed: str) -> bool:
+        """Count and tell it; False if a test fails where nothing is changed."""
         match mutant.change:
             case Change() as change:
                 self.tried[change] = failed
@@ -111,8 +113,9 @@ class Run:
                 self.planted[name] = failed or (f"survives: {reason}" if reason else "")
                 say(f"{name}, {law}: {self.planted[name] or 'survives'}")
             case package if failed:
-                self.is_sound = False
                 say(f"{package}: {failed} fails where nothing is changed")
+                return False
+        return True
 
     def _module(self, path: Path) -> str:
         name = ".".join(path.relative_to(self._root).with_suffix("").parts)
@@ -146,7 +149,7 @@ def table(rows: dict[str, Row]) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Try mutants; 0: enough were noticed, 1: not enough, 2: the tests fail without any."""
+    """Try mutants; 0: enough were noticed, 1: not enough, 2: tests fail without any, or it ended."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
     parser.add_argument("package", nargs="*", default=PACKAGES, help=f"of {', '.join(PACKAGES)}")
     parser.add_argument("--n", type=int, default=400, help="mutants that are drawn")
@@ -166,12 +169,12 @@ def main(arguments: list[str]) -> int:
     )  # fmt: skip
     settings.load_profile("mutants")
     # What runs is ended, too.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(2))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     say(f"seed {asked.seed}")
     folders = dict.fromkeys(folder for each in packages for folder in each.tests)
     pytest.main([*QUIETLY, *folders], plugins=[run])
     say(table(run.rows))
-    if not run.is_sound:
+    if not run.is_whole:
         return 2
     if asked.keep:
         possible = [change for each in packages for change in each.changes]
