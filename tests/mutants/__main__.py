@@ -149,7 +149,7 @@ def table(rows: dict[str, Row]) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Try mutants; 0: enough were noticed, 1: not enough, 2: tests fail without any, or it ended."""
+    """Try mutants; 0: enough were noticed, 1: not enough, 2: tests fail without any, or abort."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
     parser.add_argument("package", nargs="*", default=PACKAGES, help=f"of {', '.join(PACKAGES)}")
     parser.add_argument("--n", type=int, default=400, help="mutants that are drawn")
