@@ -155,6 +155,10 @@ class Trials:
         self.tests.sort(key=lambda test: (test.cpu_s, test.item.nodeid))
         return left_out
 
+    def leave_out(self, name: str) -> None:
+        """Use a test no more. Raises ValueError if there is none of this name."""
+        del self.tests[[test.item.nodeid for test in self.tests].index(name)]
+
     def judge(self, mutants: Iterable[Mutant]) -> Iterator[tuple[Mutant, str]]:
         """Each mutant and the test that fails, "time" if it had to be ended, "" if it survives."""
         # Children share what is there; none looks through it for garbage.
@@ -171,7 +175,7 @@ class Trials:
         measured.set_option("run:disable_warnings", ["no-data-collected"])
         measured.start()
         found = []
-        for item, following in zip(items, [*items[1:], None], strict=True):
+        for item, following in zip_longest(items, items[1:]):
             measured.switch_context(item.nodeid)
             since = time.process_time()
             signal.setitimer(signal.ITIMER_PROF, MOST_OF_ONE_S)
@@ -197,7 +201,7 @@ class Trials:
         limit(3 + 2 * planned_s)
         mutant.make()
         items = [test.item for test in mutant.tests]
-        for item, following in zip(items, [*items[1:], None], strict=True):
+        for item, following in zip_longest(items, items[1:]):
             if self._run(item, following):
                 return item.nodeid
         return ""
@@ -205,7 +209,11 @@ class Trials:
     def _run(self, item: pytest.Item, following: pytest.Item | None) -> bool:
         """Run one item; returns whether it failed."""
         self._failed.clear()
-        item.ihook.pytest_runtest_protocol(item=item, nextitem=following)
+        try:
+            item.ihook.pytest_runtest_protocol(item=item, nextitem=following)
+        except Exception:
+            # pytest itself stumbled.
+            return True
         return bool(self._failed)
 
 
