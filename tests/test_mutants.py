@@ -43,6 +43,9 @@ def never(n):
     while n > 0:
         n = n - 1
     return n
+
+def unknown():
+    return 5
 '''
 TESTS = """
 import pytest
@@ -100,6 +103,8 @@ def test_what_is_changed_and_what_is_not():
         "never: - to + in n - 1",
         "never: 1 to 2 in n - 1",
         "never: None for return n",
+        "unknown: None for return 5",
+        "unknown: 5 to 6 in return 5",
     }
 
 
@@ -222,7 +227,9 @@ def test_a_run_tells_which_changes_no_test_noticed(tmp_path):
         "Meter.__init__: 0 to 1 in self.unused = 0",
         "Meter.read: < to <= in self.count < 0",
         "Meter.read: 0 to 1 in self.count < 0",
+        "unknown: None for return 5",
+        "unknown: 5 to 6 in return 5",
     }
     row = told["packages"]["product"]
-    assert (row["drawn"], row["killed"], row["survived"]) == (22, 18, 4)
+    assert (row["drawn"], row["killed"], row["survived"]) == (24, 18, 6)
     assert "product/sums.py:15 Meter.__init__: deleted self.unused = 0" in done.stdout

@@ -16,11 +16,11 @@ import pytest
 from hypothesis import HealthCheck, Phase, settings
 
 from tests.mutants.changes import Change
-from tests.mutants.draw import PACKAGES, Package, shares
+from tests.mutants.draw import PACKAGES, Package, measured, shares
 from tests.mutants.ledger import Ledger, Row
 from tests.mutants.live import Live
 from tests.mutants.planted import PLANTED, Planted
-from tests.mutants.trial import Mutant, Trials
+from tests.mutants.trial import Mutant, Test, Trials
 from tests.tiers import Suite
 
 LEDGER = Path("docs/measured/mutants.json")
@@ -42,8 +42,8 @@ class Run:
         self.rows = {each.name: Row(each.n_lines) for each in packages}
         self.tried: dict[Change, str] = {}
         self.planted: dict[str, str] = {}
-        self.is_sound = False
-        """Whether the tests pass where nothing is changed."""
+        self.is_whole = False
+        """Whether it has come to its end."""
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
@@ -56,28 +56,45 @@ class Run:
         if suite := session.config.pluginmanager.get_plugin(Suite.NAME):
             suite.is_strict = False
         self._live = Live({path: importlib.import_module(self._module(path)) for path in paths})
-        self._trials = Trials(session.items, paths, os.cpu_count() or 1, self._root)
+        folders = measured(self.packages, self._root)
+        self._trials = Trials(session.items, folders, os.cpu_count() or 1, self._root)
         session.config.pluginmanager.register(self._trials)
-        left_out = self._trials.learn(self._say)
+        left_out = self._trials.learn({str(path) for path in paths}, self._say)
         tests = self._trials.tests
         self._say(f"{len(tests)} tests, {sum(test.cpu_s for test in tests):.0f} s of CPU time")
         for name in left_out:
             say(f"  left out: {name}")
-        self.is_sound = True
+        self._leave_out_what_fails_unchanged()
         for n, (mutant, failed) in enumerate(self._trials.judge(self._mutants()), 1):
             self._judged(mutant, failed)
             if n % EVERY == 0:
                 self._say(f"{n} of about {sum(self._shares)}")
+        self.is_whole = True
         return True
+
+    def _leave_out_what_fails_unchanged(self) -> None:
+        """Tests that depend on others, or on an idle machine, prove nothing."""
+        waiting = self.packages
+        while waiting:
+            unchanged = [Mutant(each, lambda: None, self._beside(each)) for each in waiting]
+            waiting = []
+            for mutant, failed in self._trials.judge(unchanged):
+                if failed:
+                    say(f"  left out: {failed} (fails in another order)")
+                    self._trials.leave_out(failed)
+                    waiting.append(mutant.change)
+
+    def _beside(self, package: Package) -> list[Test]:
+        """The tests of a package."""
+        folders = [self._root / folder for folder in package.tests]
+        return [
+            test for test in self._trials.tests
+            if any(test.item.path.is_relative_to(folder) for folder in folders)
+        ]  # fmt: skip
 
     def _mutants(self) -> Iterator[Mutant]:
         for package, share in zip(self.packages, self._shares, strict=True):
-            folders = [self._root / folder for folder in package.tests]
-            beside = [
-                test for test in self._trials.tests
-                if any(test.item.path.is_relative_to(folder) for folder in folders)
-            ]  # fmt: skip
-            yield Mutant(package.name, lambda: None, beside)
+            beside = self._beside(package)
             for planted in PLANTED:
                 if planted.file in package.files:
                     path = self._root / planted.file
@@ -106,12 +123,9 @@ class Run:
                     cut = f" ({mutant.n_cut} tests cut)" if mutant.n_cut else ""
                     tests = f"{len(mutant.tests)} tests{cut}" if mutant.tests else "no test there"
                     say(f"survives: {change} [{tests}]{f': {reason}' if reason else ''}")
-            case Planted(name=name, law=law):
-                self.planted[name] = failed
-                say(f"{name}, {law}: {failed or 'survives'}")
-            case package if failed:
-                self.is_sound = False
-                say(f"{package}: {failed} fails where nothing is changed")
+            case Planted(name=name, law=law, reason=reason):
+                self.planted[name] = failed or (f"survives: {reason}" if reason else "")
+                say(f"{name}, {law}: {self.planted[name] or 'survives'}")
 
     def _module(self, path: Path) -> str:
         name = ".".join(path.relative_to(self._root).with_suffix("").parts)
@@ -145,7 +159,7 @@ def table(rows: dict[str, Row]) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Try mutants; 0: enough were noticed, 1: not enough, 2: the tests fail without any."""
+    """Try mutants; 0: enough were noticed, 1: not enough, 2: aborted."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
     parser.add_argument("package", nargs="*", default=PACKAGES, help=f"of {', '.join(PACKAGES)}")
     parser.add_argument("--n", type=int, default=400, help="mutants that are drawn")
@@ -165,18 +179,19 @@ def main(arguments: list[str]) -> int:
     )  # fmt: skip
     settings.load_profile("mutants")
     # What runs is ended, too.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(2))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     say(f"seed {asked.seed}")
     folders = dict.fromkeys(folder for each in packages for folder in each.tests)
     pytest.main([*QUIETLY, *folders], plugins=[run])
     say(table(run.rows))
-    if not run.is_sound:
+    if not run.is_whole:
         return 2
     if asked.keep:
         possible = [change for each in packages for change in each.changes]
         ledger.take(asked.seed, run.rows, possible, run.tried, run.planted)
         ledger.keep(LEDGER)
-    return 0 if all(row.is_enough for row in run.rows.values()) else 1
+    is_enough = all(row.is_enough for row in run.rows.values()) and all(run.planted.values())
+    return 0 if is_enough else 1
 
 
 if __name__ == "__main__":

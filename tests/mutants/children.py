@@ -26,10 +26,17 @@ On a busy machine, one that computes has more.
 """
 
 
+class ChildError(Exception):
+    """A child raised this, which is our fault."""
+
+
 def in_children(
     jobs: Iterable[Job], work: Callable[[Job], Result], n: int
 ) -> Iterator[tuple[Job, Result | None]]:
-    """Each job and what `work` makes of it in a child, `n` at a time; None: the child died."""
+    """Each job and what `work` makes of it in a child, `n` at a time; None: the child died.
+
+    What `work` raises is raised here.
+    """
     running: dict[int, Job] = {}
     waiting = iter(jobs)
     with TemporaryDirectory() as folder:
@@ -44,7 +51,10 @@ def in_children(
                 told = Path(folder) / str(pid)
                 result = pickle.loads(told.read_bytes()) if told.exists() else None
                 told.unlink(missing_ok=True)
-                yield running.pop(pid), result
+                job = running.pop(pid)
+                if isinstance(result, ChildError):
+                    raise result
+                yield job, result
         finally:
             for pid in running:
                 _end(pid)
@@ -75,19 +85,22 @@ def _fork(job: Job, work: Callable[[Job], Result], folder: Path) -> int:
         return pid
     try:
         os.setpgid(0, 0)
-        said = os.dup(2)
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in range(3):
             os.dup2(nowhere, stream)
         in_use = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (in_use + MOST_MEMORY, in_use + MOST_MEMORY))
-        part = folder / f"{os.getpid()}.part"
-        part.write_bytes(pickle.dumps(work(job)))
-        part.rename(part.with_suffix(""))
+        _tell(folder, work(job))
     except Exception:
-        os.write(said, traceback.format_exc().encode())
+        _tell(folder, ChildError(traceback.format_exc()))
     finally:
         os._exit(0)
+
+
+def _tell(folder: Path, result: object) -> None:
+    part = folder / f"{os.getpid()}.part"
+    part.write_bytes(pickle.dumps(result))
+    part.rename(part.with_suffix(""))
 
 
 def _end(pid: int) -> None:

@@ -1,6 +1,6 @@
 """What is changed: the packages, their files, and the lot that falls on some of the changes."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -71,6 +71,13 @@ class Package:
                 yield change, live.maker(path, code)
             except (SyntaxError, ValueError):
                 continue
+
+
+def measured(packages: Iterable[Package], root: Path) -> list[Path]:
+    """The folders of which it is learnt what tests reach: whichever packages are asked for."""
+    tops = {*PACKAGES, *(each.name.split("/")[0] for each in packages)}
+    places = [place / top for top in sorted(tops) for place in (root / "sdrlinkd", root)]
+    return [place for place in places if place.is_dir()]
 
 
 def shares(packages: list[Package], n: int) -> list[int]:

@@ -43,7 +43,7 @@ class Ledger:
     python: str = ""
     packages: dict[str, Row] = field(default_factory=dict)
     planted: dict[str, str] = field(default_factory=dict)
-    """Of each planted mutant, the test that fails, or "" if it survives."""
+    """Of each planted mutant, the test that fails, or why it may survive; "" if it should not."""
     survivors: list[dict[str, Any]] = field(default_factory=list)
     """`drawn`: in the last run; the others are kept for their reasons."""
 

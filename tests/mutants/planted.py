@@ -12,6 +12,8 @@ class Planted(NamedTuple):
     file: str
     old: str
     new: str
+    reason: str = ""
+    """Why it survives, if it may."""
 
     def changed(self, source: str) -> str:
         """The text of the file with the change."""
@@ -82,5 +84,7 @@ PLANTED = (
         "sdrlinkd/fleet/commands.py",
         "if number < self._newest.get(operator, -1):",
         "if number <= self._newest.get(operator, -1):",
+        "this change is right: the product takes a command with the same number again after 5 s, "
+        "and is to be mended",
     ),
 )

@@ -73,24 +73,29 @@ class Mutant:
 class Learnt:
     """What the tests of a file reach, kept for as long as neither product nor tests change."""
 
-    def __init__(self, root: Path, sources: Sequence[str]) -> None:
+    def __init__(self, root: Path, measured: Sequence[str]) -> None:
         self._folder = root / "build" / "mutants"
-        self._common = sha256(repr((sys.version, sources)).encode())
+        self._common = sha256(repr((sys.version, measured)).encode())
         for folder in ("sdrlinkd", "phy", "backends", "tests"):
             for path in sorted((root / folder).rglob("*.py")):
-                if not path.name.startswith("test_"):
+                if not path.name.startswith("test_") and path.parent.name != "mutants":
                     self._common.update(path.read_bytes())
 
-    def of(self, items: Sequence[pytest.Item]) -> list[Reached] | None:
-        """What was kept of the items of a file, None if nothing was."""
-        path = self._path(items)
-        return pickle.loads(path.read_bytes()) if path.exists() else None
+    def knows(self, items: Sequence[pytest.Item]) -> bool:
+        """Whether it was kept for the items of a file."""
+        return self._path(items).exists()
 
-    def keep(self, items: Sequence[pytest.Item], found: Sequence[Reached]) -> None:
+    def of(self, items: Sequence[pytest.Item]) -> list[Reached]:
+        """What was kept."""
+        return pickle.loads(self._path(items).read_bytes())
+
+    def keep(self, items: Sequence[pytest.Item], found: Sequence[Reached]) -> bool:
         """Keep it, unless something failed, which may have been the machine's fault."""
-        if found and all(failed in ("", TOO_DEAR) for _, failed, _ in found):
-            self._folder.mkdir(parents=True, exist_ok=True)
-            self._path(items).write_bytes(pickle.dumps(found))
+        if not found or any(failed not in ("", TOO_DEAR) for _, failed, _ in found):
+            return False
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._path(items).write_bytes(pickle.dumps(found))
+        return True
 
     def _path(self, items: Sequence[pytest.Item]) -> Path:
         about = self._common.copy()
@@ -103,7 +108,7 @@ class Trials:
     """Runs the items that pytest has collected, again and again, in children."""
 
     def __init__(
-        self, items: Sequence[pytest.Item], sources: Sequence[Path], n: int, root: Path
+        self, items: Sequence[pytest.Item], folders: Sequence[Path], n: int, root: Path
     ) -> None:
         self._items = [
             item for item in items
@@ -111,7 +116,7 @@ class Trials:
             and STARTS not in getattr(item, "fixturenames", ())
         ]  # fmt: skip
         self._root = root
-        self._sources = [str(each) for each in sources]
+        self._measured = [f"{folder}/*" for folder in folders]
         self._n = n
         self._failed: list[str] = []
         self.tests: list[Test] = []
@@ -122,30 +127,37 @@ class Trials:
         if report.failed:
             self._failed.append(report.nodeid)
 
-    def learn(self, say: Callable[[str], None]) -> list[str]:
-        """Learn what each test reaches; returns the names of those left out, and why."""
+    def learn(self, files: set[str], say: Callable[[str], None]) -> list[str]:
+        """Learn what each test reaches of `files`; returns the names of those left out, and why."""
         by_file = defaultdict(list)
         for item in self._items:
             by_file[item.path].append(item)
-        learnt = Learnt(self._root, self._sources)
-        known = {path: learnt.of(items) for path, items in by_file.items()}
-        unknown = [items for path, items in by_file.items() if known[path] is None]
-        left_out = []
+        learnt = Learnt(self._root, self._measured)
+        unknown = [items for items in by_file.values() if not learnt.knows(items)]
+        failing = {}
         for n, (items, found) in enumerate(in_children(unknown, self._learn_of, self._n), 1):
-            known[items[0].path] = found
-            learnt.keep(items, found or ())
+            if not learnt.keep(items, found or ()):
+                failing[items[0].path] = found or ()
             if n % EVERY == 0:
                 say(f"{n} of {len(unknown)} files of tests learnt")
+        left_out = []
         for path, items in by_file.items():
+            found = failing[path] if path in failing else learnt.of(items)
             for item, (cpu_s, failed, lines) in zip_longest(
-                items, known[path] or (), fillvalue=(0.0, "ends", set())
+                items, found, fillvalue=(0.0, "ends", set())
             ):
                 if failed:
                     left_out.append(f"{item.nodeid} ({failed})")
                 else:
-                    self.tests.append(Test(item, cpu_s, lines))
+                    self.tests.append(
+                        Test(item, cpu_s, {each for each in lines if each[0] in files})
+                    )
         self.tests.sort(key=lambda test: (test.cpu_s, test.item.nodeid))
         return left_out
+
+    def leave_out(self, name: str) -> None:
+        """Use a test no more. Raises ValueError if there is none of this name."""
+        del self.tests[[test.item.nodeid for test in self.tests].index(name)]
 
     def judge(self, mutants: Iterable[Mutant]) -> Iterator[tuple[Mutant, str]]:
         """Each mutant and the test that fails, "time" if it had to be ended, "" if it survives."""
@@ -158,12 +170,12 @@ class Trials:
         """What is learnt of each item of a file."""
         limit(60 + MOST_OF_ONE_S * len(items))
         signal.signal(signal.SIGPROF, _too_dear)
-        measured = coverage.Coverage(data_file=None, config_file=False, include=self._sources)
+        measured = coverage.Coverage(data_file=None, config_file=False, include=self._measured)
         # A file without a function that runs is no reason to complain.
         measured.set_option("run:disable_warnings", ["no-data-collected"])
         measured.start()
         found = []
-        for item, following in zip(items, [*items[1:], None], strict=True):
+        for item, following in zip_longest(items, items[1:]):
             measured.switch_context(item.nodeid)
             since = time.process_time()
             signal.setitimer(signal.ITIMER_PROF, MOST_OF_ONE_S)
@@ -189,7 +201,7 @@ class Trials:
         limit(3 + 2 * planned_s)
         mutant.make()
         items = [test.item for test in mutant.tests]
-        for item, following in zip(items, [*items[1:], None], strict=True):
+        for item, following in zip_longest(items, items[1:]):
             if self._run(item, following):
                 return item.nodeid
         return ""
@@ -197,7 +209,11 @@ class Trials:
     def _run(self, item: pytest.Item, following: pytest.Item | None) -> bool:
         """Run one item; returns whether it failed."""
         self._failed.clear()
-        item.ihook.pytest_runtest_protocol(item=item, nextitem=following)
+        try:
+            item.ihook.pytest_runtest_protocol(item=item, nextitem=following)
+        except Exception:
+            # pytest itself stumbled.
+            return True
         return bool(self._failed)
 
 
