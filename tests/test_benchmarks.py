@@ -32,8 +32,8 @@ MISSED = {
 }  # fmt: skip
 # Rows of recordings that are not available everywhere.
 OPTIONAL = {"ptp_over_wifi_strays_ms"}
-# These take a few seconds; the others are for the long tier.
-SMALL = {"repeats", "sealing"}
+# It takes a few seconds; the others are for the long tier.
+SMALL = {"sealing"}
 # Why a benchmark cannot run here, if so.
 LACKING = {"radio": no_test_radio, "flowgraphs": no_gnu_radio, "adapters": no_rclpy}
 # Peers take long, and need the machine to themselves.
