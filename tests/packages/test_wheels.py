@@ -95,5 +95,5 @@ def test_both_in_one_environment_come_and_go_without_each_other(wheels, pip, fou
 
 def test_a_checkout_that_is_edited_comes_before_the_clients(wheels, pip, found):
     pip("install", "--no-deps", "--no-compile", wheels[1])
-    pip("install", "--no-deps", "--no-build-isolation", "--editable", ROOT)
+    pip("install", "--no-deps", "--editable", ROOT)
     assert found() == (str(ROOT / "sdrlinkd/client/__init__.py"), True)
