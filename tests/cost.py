@@ -1,5 +1,6 @@
 """What tests cost: the processor time of this process and of all that descend from it."""
 
+import contextlib
 import os
 import resource
 import time
@@ -26,14 +27,13 @@ def spent_s() -> float:
 
 def descendants(pid: int) -> Iterator[int]:
     """The living children of process `pid`, their children, and so on."""
-    for children in Path(f"/proc/{pid}/task").glob("*/children"):
-        try:
-            found = [int(word) for word in children.read_text().split()]
-        except OSError:
-            continue
-        for child in found:
-            yield child
-            yield from descendants(child)
+    # Processes and threads end while this looks at them.
+    with contextlib.suppress(OSError):
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            with contextlib.suppress(OSError):
+                for word in (thread / "children").read_text().split():
+                    yield int(word)
+                    yield from descendants(int(word))
 
 
 def started_by(mark: str) -> Iterator[tuple[int, str, str]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cost import descendants
 from tests.machine import lacks, left_out
 from tests.tiers import Cost, kept, too_dear
 
@@ -142,3 +143,9 @@ def test_the_table_of_tiers_gets_the_row_of_its_command():
         "before\n\n| `make quick` | 7 (2 CPU s) | – | – | 1 (20 CPU s) | 31 | 12 |\n"
         "| `make test` | old |\n\nafter\n"
     )
+
+
+def test_processes_may_end_while_they_are_counted():
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        process.wait()
+    assert list(descendants(process.pid)) == []
