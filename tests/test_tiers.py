@@ -139,8 +139,8 @@ def test_a_tier_has_a_limit(cost, allowed, mark):
 
 def test_the_table_of_tiers_gets_the_row_of_its_command():
     text = "before\n\n| `make quick` | old |\n| `make test` | old |\n\nafter\n"
-    assert kept(text, "make quick", [("quick", 7, 1.5), ("long", 1, 20.0)], 31.2, 12.3) == (
-        "before\n\n| `make quick` | 7 (2 CPU s) | – | – | 1 (20 CPU s) | 31 | 12 |\n"
+    assert kept(text, "make quick", [("quick", 7, 1.5), ("long", 1, 20.0)], 31.2, 12.3, 1.26) == (
+        "before\n\n| `make quick` | 7 (2 CPU s) | – | – | 1 (20 CPU s) | 31 | 12 | 1.3 |\n"
         "| `make test` | old |\n\nafter\n"
     )
 

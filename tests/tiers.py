@@ -10,6 +10,7 @@ long      figures, whole systems, many trials       make test-long
 import contextlib
 import fcntl
 import json
+import math
 import os
 import signal
 import tempfile
@@ -42,6 +43,8 @@ USUAL_LIMITS = Limits(cpu_s=120, idle_s=90, wall_s=600)
 TABLE = Path(__file__).parents[1] / "CONTRIBUTING.md"
 DEAREST = 10
 SLOW = 1.5
+LOOK_S = 20.0
+"""How often the slowness of the core is measured."""
 
 
 @dataclass
@@ -51,6 +54,8 @@ class Cost:
     tier: str
     own_s: float = 0.0
     shared_s: float = 0.0
+    slowness: float = 1.0
+    """Of the core, at that time."""
 
     @property
     def all_s(self) -> float:
@@ -70,6 +75,7 @@ class Suite:
         os.environ[RUN] = self._name
         self._begin_s, self._shared_s = 0.0, 0.0
         self._begin = time.monotonic()
+        self._slowness, self._looked_at = 1.0, -math.inf
         self._costs: dict[str, Cost] = {}
         self.is_strict = True
         """Whether items that cost too much, hang, or leave processes, fail."""
@@ -95,12 +101,13 @@ class Suite:
         self, fixturedef: pytest.FixtureDef[object]
     ) -> Generator[None, object, object]:
         """What several items share is not charged to the one that comes first."""
+        if fixturedef.scope == "function":
+            return (yield)
         begin, before = spent_s(), self._shared_s
         try:
             return (yield)
         finally:
-            if fixturedef.scope != "function":
-                self._shared_s = before + spent_s() - begin
+            self._shared_s = before + spent_s() - begin
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_teardown(
@@ -112,7 +119,8 @@ class Suite:
             return result
         if nextitem is None or nextitem.path != item.path:
             self._end_what_is_left()
-        cost = Cost(tier(item), spent_s() - self._begin_s - self._shared_s, self._shared_s)
+        own_s = spent_s() - self._begin_s - self._shared_s
+        cost = Cost(tier(item), own_s, self._shared_s, self._slow())
         item.user_properties.append(("cost", asdict(cost)))
         if too_dear(cost, 1.0) and (complaint := too_dear(cost, allowance())):
             pytest.fail(complaint, pytrace=False)
@@ -139,10 +147,13 @@ class Suite:
         # All workers descend from this process.
         spent, wall = spent_s(), time.monotonic() - self._begin
         write(f"in all {spent:.0f} CPU s, collection included, in {wall:.0f} s by the clock")
-        if (slow := slowness()) > SLOW:
-            write(f"this machine computes {slow:.1f} times as slowly as usual")
+        usual = sum(cost.all_s / cost.slowness for cost in self._costs.values())
+        slow = sum(cost.all_s for cost in self._costs.values()) / max(usual, 1e-9)
+        if slow > SLOW:
+            write(f"this machine computed {slow:.1f} times as slowly as a core of 3 GHz: there, "
+                  f"{spent / slow:.0f} CPU s")  # fmt: skip
         if command := os.environ.get("SDRLINK_KEEP_TIERS"):
-            TABLE.write_text(kept(TABLE.read_text(), command, sums, spent, wall))
+            TABLE.write_text(kept(TABLE.read_text(), command, sums, spent, wall, slow))
 
     @contextlib.contextmanager
     def _turn(self, *, alone: bool) -> Iterator[None]:
@@ -155,6 +166,11 @@ class Suite:
             yield
         finally:
             fcntl.flock(self._alone, fcntl.LOCK_UN)
+
+    def _slow(self) -> float:
+        if (now := time.monotonic()) > self._looked_at + LOOK_S:
+            self._slowness, self._looked_at = slowness(), now
+        return self._slowness
 
     def share(self, seconds: float) -> None:
         """Do not charge this processor time to the item that runs: others have use of it, too."""
@@ -202,12 +218,13 @@ def by_tier(costs: Iterator[Cost]) -> list[tuple[str, int, float]]:
 
 
 def kept(
-    text: str, command: str, sums: list[tuple[str, int, float]], spent_s: float, wall_s: float
-) -> str:
+    text: str, command: str, sums: list[tuple[str, int, float]], spent_s: float, wall_s: float,
+    slow: float,
+) -> str:  # fmt: skip
     """The text with the row of `command` in the table of tiers made anew."""
     items = {name: f"{n} ({cpu_s:.0f} CPU s)" for name, n, cpu_s in sums}
     cells = [items.get(name, "–") for name in TIERS]
-    row = f"| `{command}` | {' | '.join(cells)} | {spent_s:.0f} | {wall_s:.0f} |"
+    row = f"| `{command}` | {' | '.join(cells)} | {spent_s:.0f} | {wall_s:.0f} | {slow:.1f} |"
     begin = f"| `{command}` |"
     lines = text.splitlines()
     place = max(n for n, line in enumerate(lines) if line.startswith(begin))
