@@ -3,10 +3,16 @@
 import time
 from collections.abc import Callable
 
+SHORTEST_S, LONGEST_S = 0.01, 0.1
+LONGER = 0.1
+"""How much longer the condition may have held than it was waited for."""
+
 
 def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
     """Wait until `condition()` holds; fails after `timeout_s`. For conditions without events."""
-    deadline = time.monotonic() + timeout_s
+    began = time.monotonic()
     while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.01)
+        looked = time.monotonic()
+        assert looked < began + timeout_s, "waited in vain"
+        # What is waited for needs the processor more than who asks for it.
+        time.sleep(max(SHORTEST_S, min(LONGEST_S, LONGER * (looked - began))))

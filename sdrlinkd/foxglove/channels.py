@@ -1,6 +1,7 @@
 """Channels of the topics that other robots send: their octets as they came, with ROS 2 schemas."""
 
 import logging
+import time
 from typing import NamedTuple
 
 from foxglove import Channel, Context, Schema
@@ -19,6 +20,7 @@ _log = logging.getLogger(__name__)
 class _Kept(NamedTuple):
     payload: bytes
     time_ns: int
+    passed_at: float
 
 
 class ReceivedTopics:
@@ -47,26 +49,28 @@ class ReceivedTopics:
         if channel is None:
             self.not_shown += 1
             return
+        at = time.monotonic()
         channel.log(message.payload, log_time=message.received_ns)
         self.passed += 1
-        self._keep(message)
+        self._keep(message, at)
 
-    def again(self, topic: str, client: int) -> None:
+    def again(self, topic: str, client: int, since: float) -> None:
         """Give a client that subscribes to a topic the last message, as it missed the first ones.
 
-        A map and static transforms come only once.
+        A map and static transforms come only once. What was passed on after the client had
+        subscribed, at the monotonic time `since`, it has got already.
         """
         kept = self._kept.get(topic)
-        if kept is not None:
+        if kept is not None and kept.passed_at <= since:
             # In this SDK the id of a client is that of its sink.
             _, channel = self._channels[topic]
             channel.log(kept.payload, log_time=kept.time_ns, sink_id=client)
 
-    def _keep(self, message: Message) -> None:
+    def _keep(self, message: Message, at: float) -> None:
         old = self._kept.pop(message.topic, None)
         self._kept_bytes -= 0 if old is None else len(old.payload)
         if self._kept_bytes + len(message.payload) <= MOST_KEPT_BYTES:
-            self._kept[message.topic] = _Kept(message.payload, message.received_ns)
+            self._kept[message.topic] = _Kept(message.payload, message.received_ns, at)
             self._kept_bytes += len(message.payload)
 
     def _open(self, topic: str, kind: str, old: Channel | None) -> Channel | None:
@@ -77,7 +81,7 @@ class ReceivedTopics:
             return None
         if old is not None:
             old.close()
-            self._kept_bytes -= len(self._kept.pop(topic, _Kept(b"", 0)).payload)
+            self._kept_bytes -= len(self._kept.pop(topic, _Kept(b"", 0, 0.0)).payload)
         self._made += 1
         text = definition(kind)
         # A type that nobody here knows has a name and no definition.

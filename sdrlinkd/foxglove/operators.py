@@ -39,14 +39,14 @@ class _Waiting(NamedTuple):
 
 
 class Operators(ServerListener):
-    """Takes what clients publish; tells by `subscribed(topic, client)` what they subscribe to.
+    """Takes what clients publish; tells by `subscribed(topic, client, at)` what they subscribe to.
 
     Methods `on_*` are called from threads of the server, all others from the loop.
     """
 
     def __init__(
         self, patterns: Sequence[str], say: Callable[[str, str], None],
-        publish: Publish, subscribed: Callable[[str, int], None],
+        publish: Publish, subscribed: Callable[[str, int, float], None],
     ) -> None:  # fmt: skip
         self._patterns = list(patterns)
         self._subscribed = subscribed
@@ -71,8 +71,8 @@ class Operators(ServerListener):
         """Commands dropped for newer ones."""
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        """Tell that a client has subscribed to a topic."""
-        self._soon(self._subscribed, channel.topic, client.id)
+        """Tell that a client has subscribed to a topic, and at what monotonic time."""
+        self._soon(self._subscribed, channel.topic, client.id, time.monotonic())
 
     def on_client_advertise(self, client: Client, channel: ClientChannel) -> None:
         """Note what a client is going to publish, and say at once if that is refused."""

@@ -245,7 +245,7 @@ def test_a_full_queue_refuses_the_new_message():
 SOON = PAPER._replace(inactivity_step_s=0.2)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @law(15)
 @given(graphs(6), st.sampled_from([0.01, 0.05, 0.1]), st.integers(0, 99))
 def test_losses_cost_time_but_no_message_and_one_token_is_left(graph, loss, seed):
@@ -342,7 +342,7 @@ def test_the_network_begins_anew_when_all_who_know_the_token_are_gone():
     assert ascending(heard.tokens_after(4.5))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @law(25)
 @given(graphs(), st.integers(1, 6), st.integers(0, 40))
 def test_of_two_tokens_one_is_dropped(graph, node, phase):

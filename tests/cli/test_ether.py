@@ -197,7 +197,7 @@ def test_why_names_the_missing_hub(start_daemon, ctl, tmp_path_factory):
     assert out.splitlines()[1].startswith("the link is DOWN: no hub since ")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
     folder = tmp_path_factory.mktemp("air")
     hub, _ = start_hub(folder)

@@ -12,6 +12,7 @@ from sdrlinkd.cli.top.live import TopApp
 from sdrlinkd.client import RefusedError
 from tests.cli.pictures import assert_stored
 from tests.cli.snapshots import SNAPSHOT, busy
+from tests.laws import one_in
 
 
 class Asked:
@@ -65,7 +66,9 @@ async def shown(pilot, moments):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("size", "name"), [((80, 24), "top"), ((140, 40), "top-140x40")])
+@pytest.mark.parametrize(
+    ("size", "name"), one_in(2, [((80, 24), "top"), ((140, 40), "top-140x40")])
+)
 async def test_the_screen_is_the_stored_one(size, name):
     async with make_app().run_test(size=size) as pilot:
         await shown(pilot, [busy(at) for at in range(300)])

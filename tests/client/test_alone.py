@@ -85,6 +85,7 @@ def test_what_is_newer_would_be_seen(tmp_path, newer):
     assert found.returncode == 1
 
 
+@pytest.mark.long
 def test_the_wheel_is_the_client_alone(wheel, start_daemon, tmp_path):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
@@ -110,7 +111,7 @@ def test_the_wheel_is_the_client_alone(wheel, start_daemon, tmp_path):
     run_alone(tmp_path / "bare/bin/python", start_daemon().directory)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_real_python_3_10(wheel, start_daemon, tmp_path):
     python = python_3_10()
     if python is None:

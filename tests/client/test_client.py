@@ -88,11 +88,11 @@ def test_a_burst_and_an_immediate_exit_arrive_whole(start_daemon):
     code = (
         "from sdrlinkd.client import Publisher\n"
         "with Publisher() as out:\n"
-        "    for i in range(20000): out.send('/robot_1/odom', bytes([0, 1, 0, 0]) + bytes(700))\n"
+        "    for i in range(5000): out.send('/robot_1/odom', bytes([0, 1, 0, 0]) + bytes(700))\n"
     )
     environment = {**os.environ, "SDRLINKD_RUNTIME_DIR": str(daemon.directory)}
     subprocess.run([sys.executable, "-c", code], check=True, env=environment, timeout=60)
-    assert daemon.snapshot().link.tx.accepted == 20_000
+    assert daemon.snapshot().link.tx.accepted == 5000
 
 
 def test_flush_ends_when_all_is_taken(start_daemon):
@@ -133,7 +133,7 @@ def test_numbers_run_per_topic_and_nothing_is_lost(start_daemon):
 
 def test_a_slow_reader_sees_the_gap_in_the_numbers(start_daemon):
     daemon = start_daemon()
-    sent = 6000
+    sent = 3000
     with (
         Subscriber("/rx_robot_1/odom", directory=daemon.directory, depth=1) as slow,
         Subscriber("/rx_robot_1/odom", directory=daemon.directory, depth=0) as quick,

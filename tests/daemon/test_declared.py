@@ -213,6 +213,8 @@ def test_the_dead_man_of_a_command_stops_the_robot_in_the_commands_type(
             Subscriber("/rx_robot_1/robot_2/cmd_vel", directory=two.directory) as heard,
             Publisher(one.directory) as out,
         ):
+            # What is sent before the other robot listens, it does not hear.
+            wait_for(lambda: ask(one, "demand")["wanted"] == {"/robot_2/cmd_vel": [2]}, 60)
             out.send("/robot_2/cmd_vel", CDR + bytes(48), dst=2)
             first, stop = heard.receive(60), heard.receive(60)
         assert (first.payload, first.is_stop) == (CDR + bytes(48), False)

@@ -64,6 +64,7 @@ def test_without_a_hub_a_daemon_stays_and_joins_when_there_is_one(
         wait_for(lambda: "the hub is up after" in daemon.log())
 
 
+@pytest.mark.long
 def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(start_daemon, tmp_path_factory):
     hub = tmp_path_factory.mktemp("hub")
     with serving(hub, **AIR):

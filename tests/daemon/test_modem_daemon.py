@@ -14,6 +14,7 @@ import pytest
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.family import family
 from tests.conftest import ETC
+from tests.laws import one_in
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
@@ -65,13 +66,14 @@ def test_messages_go_over_the_air_unchanged_with_ages_and_snr(start_daemon):
         assert control.ask("check")["problems"] == []
 
 
-@pytest.mark.parametrize("grid", ["64/8", "128/16", "256/32"])
+@pytest.mark.parametrize("grid", one_in(3, ["64/8", "128/16", "256/32"]))
 def test_messages_go_over_the_air_on_any_grid_with_a_stronger_preamble(start_daemon, grid):
     keys = f'rate_hz = 2e6\ngrid = "{grid}"\npreamble_boost_db = 3\none_crystal = false'
     node = start_daemon(LOOPBACK.replace("rate_hz = 2e6", keys))
     sent_and_heard(node, 10)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("factor", [2, 4])
 def test_a_radio_may_be_faster_than_the_modem(start_daemon, factor):
     """The noise in the modem's band equals that at the modem's own rate."""
@@ -92,6 +94,7 @@ def test_stopping_sends_what_is_queued_first(start_daemon):
     assert "out 30/30 sent, 0 queued, 0 dropped" in node.log()
 
 
+@pytest.mark.long
 def test_a_receiver_too_slow_for_its_rate_says_so_and_stays_small(start_daemon):
     # With 4-fold oversampling, even the fastest machine is too slow for this.
     keys = "rate_hz = 2e8\noversampling = 4\nmax_cfo_hz = 1e5\n"
@@ -162,7 +165,7 @@ def test_a_recording_of_another_rate_is_refused_in_one_line(write_config, tmp_pa
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("paced", [False, True])
+@pytest.mark.parametrize("paced", one_in(2, [False, True]))
 def test_a_recording_ends_with_what_the_daemon_plays_into_it(start_daemon, tmp_path, paced):
     """Unpaced, it would quickly fill the disk."""
     node = start_daemon(

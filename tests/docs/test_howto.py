@@ -10,6 +10,7 @@ from sdrlinkd.manual import find_how_to, how_tos
 from sdrlinkd.process import wait_until
 from tests.docs.pages import ROOT, commands_of
 from tests.docs.reader import PATIENCE_S, Reader
+from tests.laws import one_in
 
 FOLDER = ROOT / "docs/howto"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index")
@@ -38,7 +39,7 @@ def reader(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TYPED)
+@pytest.mark.parametrize("name", one_in(4, TYPED))
 def test_commands_work_and_show_what_is_printed(reader, name):
     text = (FOLDER / f"{name}.md").read_text()
     if not STARTS_ITS_OWN.search(text):

@@ -77,7 +77,7 @@ def test_the_readme():
         assert not missing_words(command.shown, screen), screen
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_ether(reader):
     typist = reader()
     for command in commands_of(text_of("backends/ether/README.md")):

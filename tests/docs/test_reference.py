@@ -70,7 +70,7 @@ def test_the_page_of_benchmarks_is_that_of_what_is_kept():
     assert benchmarks_page.PAGE.read_text() == benchmarks_page.page(), "`make figures` writes it"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pictures_are_drawn_of_what_is_kept(tmp_path, monkeypatch):
     for module in ("latency.pictures", "pound.pictures", "timesync.pictures", "phy_curves"):
         monkeypatch.setattr(f"benchmarks.{module}.FIGURES", tmp_path)

@@ -15,6 +15,7 @@ from tests.web.odometry import odometry
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
 def test_a_drive_of_two_robots(end, start_daemon, tmp_path):
     with pair(start_daemon, tmp_path / "hub") as daemons:

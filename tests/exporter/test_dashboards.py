@@ -94,7 +94,7 @@ def traffic(*daemons):
         thread.join()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("prometheus") is None, reason=lacks("prometheus"))
 def test_every_query_finds_something_in_a_link_with_traffic(
     start_daemon, start_exporter, start_prometheus, tmp_path_factory

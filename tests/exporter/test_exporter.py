@@ -135,7 +135,7 @@ def test_promtool_has_nothing_to_say_against_the_text(exporter):
 
 
 @needs_prometheus
-@pytest.mark.slow
+@pytest.mark.long
 def test_prometheus_reads_it_and_evaluates_every_rule(exporter, start_prometheus):
     prometheus = start_prometheus(exporter, [RULES])
 

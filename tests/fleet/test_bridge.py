@@ -132,6 +132,7 @@ def adds_up(report):
     )
 
 
+@pytest.mark.long
 def test_two_airs_are_one_team(islands):
     islands.start(["odom", "sc*"])
     with Hearing(islands.daemons[4]) as far, Hearing(islands.daemons[1]) as near:

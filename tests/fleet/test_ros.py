@@ -76,7 +76,7 @@ def test_a_node_gets_each_message_once_and_typed(desk):
     assert {each.hash for each in published} == {type_hash(ODOM)}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_node_commands_a_robot_once_through_one_gateway(desk):
     command = desk.node(ROS2Publisher, f"/robot_{ROBOT}/cmd_vel", TWIST)
     wait_for(lambda: [each.name for each in tokens(desk, Role.SUBSCRIPTION)])
@@ -103,7 +103,7 @@ def test_a_node_commands_a_robot_once_through_one_gateway(desk):
         assert report.down_taken == sum(report.down.values()) == 21
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_gateways_put_is_no_command(start_fleet):
     fleet = start_fleet(f'ros_domain = {DOMAIN}\ndown = ["*"]\n')
     wait_for(lambda: fleet.leader is not None)
@@ -115,7 +115,7 @@ def test_what_gateways_put_is_no_command(start_fleet):
     assert [fleet.report(each).down_taken for each in (FIRST, SECOND)] == [0, 0]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_late_node_gets_what_is_latched(start_fleet):
     fleet = start_fleet(
         f'ros_domain = {DOMAIN}\n[topic.map]\ndurability = "transient_local"\ndepth = 1\n'
@@ -134,7 +134,7 @@ def test_a_late_node_gets_what_is_latched(start_fleet):
         late.undeclare()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_hash_of_a_type_that_is_unknown_here_is_learnt_from_subscriptions(start_fleet):
     fleet = start_fleet(f"ros_domain = {DOMAIN}\n", top="auto = true\n")
     thing, right, wrong = "my_msgs/msg/Thing", f"RIHS01_{'ab' * 32}", f"RIHS01_{'cd' * 32}"

@@ -37,7 +37,8 @@ def test_topics_come_with_their_schemas_and_their_very_octets(team):
         # A client hears of a topic with its first message, and subscribes then.
         out.send("/robot_1/odom", odometry(0.0))
         out.send("/robot_1/strange", CDR)
-        viewer.until(lambda: {"/rx_robot_1/odom", "/rx_robot_1/strange"} <= set(viewer.channels))
+        for name in ("odom", "strange"):
+            viewer.until(lambda name=name: viewer.payloads(f"/rx_robot_1/{name}"))
         for each in sent:
             out.send("/robot_1/odom", each)
         out.send("/robot_1/strange", odd)
@@ -192,6 +193,7 @@ def _sentences(viewer):
     return [each["message"] for each in viewer.statuses]
 
 
+@pytest.mark.long
 def test_a_topic_of_the_registry_is_sent_as_this_robots_own(start_daemon):
     daemon = start_daemon('namespace = "robot_2"\n')
     with (
@@ -214,6 +216,7 @@ def test_a_topic_of_the_registry_is_sent_as_this_robots_own(start_daemon):
         viewer.until(lambda: "allowed: topics of a robot" in "".join(_sentences(viewer)))
 
 
+@pytest.mark.long
 def test_the_bridge_waits_for_the_daemon_and_goes_on(start_daemon):
     daemon = start_daemon()
     topic = "/rx_robot_1/odom"

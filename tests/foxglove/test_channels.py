@@ -5,6 +5,7 @@ import json
 import resource
 import socket
 import struct
+import time
 from contextlib import closing
 
 import pytest
@@ -124,8 +125,13 @@ def test_last_messages_are_kept_within_bounds(context, monkeypatch):
     topics.take(message("/a", kind="a/msg/B", payload=bytes(100)))
     topics.take(message("/b", payload=bytes(900)))
     topics.take(message("/c", payload=bytes(1)))
+    now = time.monotonic()
     for topic in ("/a", "/b", "/c"):
-        topics.again(topic, 1)
+        # Who had subscribed before has got it.
+        topics.again(topic, 1, now - 60.0)
+    assert given == {}
+    for topic in ("/a", "/b", "/c"):
+        topics.again(topic, 1, now)
     assert given == {"/a": 100, "/b": 900}
 
 

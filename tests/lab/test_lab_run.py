@@ -106,7 +106,7 @@ def test_another_seed_gives_another_run(runs):
     assert [robot.snr_db for robot in other.robots] != [robot.snr_db for robot in first.robots]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_daemon_that_cannot_start_tells_why(run_small, nothing_left):
     with pytest.raises(UserError) as error:
         run_small(extra="slot_s = 1e-4\n")
@@ -159,7 +159,7 @@ def test_an_interrupt_while_a_process_starts_leaves_none(run_small, nothing_left
             process.wait()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_lab_that_is_interrupted_leaves_nothing_behind(tmp_path_factory):
     folder = tmp_path_factory.mktemp("end")
     path = write_scenario(folder, pace="realtime")
