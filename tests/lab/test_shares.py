@@ -20,7 +20,7 @@ CLOSE = {"minislot": 0.05, "tdma": 0.08, "csma": 0.5}
 
 
 @pytest.mark.parametrize("policy", CLOSE)
-@pytest.mark.parametrize("radio", one_in(2, RADIOS))
+@pytest.mark.parametrize("radio", one_in(4, RADIOS))
 def test_the_share_that_is_told_is_the_share_that_is_carried(policy, radio):
     n = 3
     sim, carried = saturated(policy, n, seed=n, **RADIOS[radio])

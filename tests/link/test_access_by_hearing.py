@@ -13,7 +13,7 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Qos, Sensed
 from sdrlinkd.link.access import BACK_S, Waiting, Wish, make_access
 from sdrlinkd.wire import LAST_PLAN, Frame, Grant
-from tests.laws import law, one_in
+from tests.laws import law
 from tests.link.pulsing import FAST
 from tests.link.radios import params
 from tests.link.turns import tell, told_events
@@ -94,8 +94,8 @@ def test_turns_by_request_from_the_start_where_some_do_not_hear_each_other(relay
     assert any("turns by request instead of the auction" in each for each in notices)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("relays", one_in(2, [False, True]))
+@pytest.mark.long
+@pytest.mark.parametrize("relays", [False, True])
 def test_where_all_hear_all_losses_and_robots_that_leave_end_no_auction(relays):
     off = {3: [Outage(3.0, 5.5), Outage(7.0, 11.2)], 4: [Outage(4.0, 60.0)]}
     _, used = drive([(0.0, NEAR)], 15.0, seed=3, lost=0.05, relays=relays, off=off)

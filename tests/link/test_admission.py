@@ -19,7 +19,7 @@ from sdrlinkd.link.packing import PiggybackRecords
 from sdrlinkd.link.routes import cost_of
 from sdrlinkd.link.schedule import Claim, TeamAir, admitted, planner_of, way_of
 from sdrlinkd.wire import BROADCAST, Admit, Beacon, Flows, RecordType, ReservedFlow
-from tests.laws import law
+from tests.laws import law, one_in
 from tests.link.lossy import PDU_SIZE, Air
 from tests.link.world import records_in, tell
 
@@ -145,7 +145,7 @@ def all_agree(air):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("loss", [0.0, 0.3])
+@pytest.mark.parametrize("loss", one_in(2, [0.3, 0.0]))
 def test_over_two_hops_all_hear_the_same_word(loss):
     rng = Random(3)
     air = team(lost=lambda *_: rng.random() < loss)
@@ -327,7 +327,7 @@ def test_a_beacon_does_not_replace_them(kind):
     assert waiting.holds(kind)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_records_alone_take_little_air():
     robots = range(1, 9)
     air = team(robots=robots, hears={(a, b) for a in robots for b in robots if a != b})

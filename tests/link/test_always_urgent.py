@@ -51,8 +51,8 @@ def urgent_air_s(air, since):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("has_bulk", [False, True])
-@pytest.mark.parametrize("chatty", [(0,), (0, 1, 2)])
+@pytest.mark.parametrize("has_bulk", one_in(2, [True, False]))
+@pytest.mark.parametrize("chatty", [(0, 1, 2), pytest.param((0,), marks=pytest.mark.long)])
 def test_in_an_auction_nobody_who_always_has_something_urgent_goes_twice_before_another(
     chatty, has_bulk
 ):
