@@ -1,4 +1,4 @@
-"""Number of random trials: a quarter of them in `make test`, all in `make test-long`.
+"""Number of random trials: a fifth of them in `make test`, all in `make test-long`.
 
 `SDRLINK_TRIALS` is the share; `make soak` and `make fuzz` set it far above 1.
 """
@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-USUAL = 0.25
+USUAL = 0.2
 FACTOR = float(os.environ.get("SDRLINK_TRIALS", USUAL))
-FEWEST = 10
+FEWEST = 5
 """Examples of a law, at least, unless it names fewer itself."""
 
 
@@ -41,7 +41,7 @@ def at_most(n: int) -> int:
 def law(n: int = 100) -> settings:
     """`n` examples of a law: always the same ones, unless new ones are requested.
 
-    A fault that one example in 50 shows is found by 200 of them with 98 %, by a quarter with 64 %;
+    A fault that one example in 50 shows is found by 200 of them with 98 %, by a fifth with 55 %;
     the long tier makes up for that each night.
     """
     return settings(derandomize=FACTOR <= 1, deadline=None, max_examples=trials(n))

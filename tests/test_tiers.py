@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cost import descendants
+from tests.laws import USUAL
 from tests.machine import lacks, left_out
 from tests.tiers import Cost, kept, too_dear
 
@@ -93,7 +94,7 @@ def test_a_run_ends_in_time_and_names_each_item_that_is_at_fault(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-c", os.devnull, "-p", "no:cacheprovider",
          "--rootdir", tmp_path, "-W", "ignore", tmp_path],
-        env={**os.environ, "PYTHONPATH": str(ROOT), "SDRLINK_TRIALS": "0.25"},
+        env={**os.environ, "PYTHONPATH": str(ROOT), "SDRLINK_TRIALS": str(USUAL)},
         cwd=tmp_path, capture_output=True, text=True, check=False, timeout=200,
     )  # fmt: skip
     out = done.stdout

@@ -165,7 +165,7 @@ def test_a_robot_that_is_not_named_forwards_nothing():
     assert two.audit() == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @law(40)
 @given(st.integers(0, 2**32))
 def test_in_any_mesh_everybody_gets_everything_once(seed):

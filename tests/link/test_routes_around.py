@@ -16,7 +16,7 @@ def going_around(air):
     return {robot: link.report(air.now).routes.going_around for robot, link in air.links.items()}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_nobody_is_gone_around_for_pdus_that_hold_only_records():
     """Nobody answers for these, so a relay must not wait for answers to them."""
     air = mesh((1, 2), (2, 3), (2, 4), (3, 5), (4, 6))

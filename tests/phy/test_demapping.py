@@ -20,6 +20,7 @@ from phy.testing import (
     to_tones,
     tones,
 )
+from tests.laws import one_in
 
 SEED = 17
 GRID = OFDM_64_16
@@ -207,7 +208,7 @@ def faded_symbols(modulation, h, no, rng):
 
 
 @pytest.mark.slow
-@every_modulation
+@pytest.mark.parametrize("modulation", one_in(4, reversed(Modulation)))
 def test_a_channel_that_fades_is_followed(modulation):
     """Echoes rotate against each other: the band moves through its fades, as at 40 Hz and 5 Msps.
 

@@ -213,10 +213,8 @@ def test_after_an_outage_one_way_messages_come_again_at_once(off_s):
     assert team.robots[2].heard[0].at - back_at < 2.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("pdu_size", "robots"), [(46, 8), pytest.param(64, 16, marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("pdu_size", "robots"), [(46, 8), (64, 16)])
 def test_many_robots_in_small_pdus_stay_proven(pdu_size, robots):
     team = Team(*(Robot(each, [KEY], pdu_size=pdu_size) for each in range(1, robots + 1)))
     team.run(20.0)

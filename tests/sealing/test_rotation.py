@@ -5,6 +5,7 @@ import pytest
 from sdrlinkd.sealing import Remembered
 from sdrlinkd.sealing.testing import CONSTANTS, QUIET_S
 from sdrlinkd.wire import N_TICKS, parse_sealed
+from tests.laws import one_in
 from tests.sealing.team import KEY, NEXT, Robot, Team
 
 CDR = b"\0\1\0\0"
@@ -29,7 +30,7 @@ class Messages:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("apart_s", [0.0, 7.0])
+@pytest.mark.parametrize("apart_s", one_in(2, [7.0, 0.0]))
 def test_none_lost_while_keys_change(apart_s):
     team = Team(*(Robot(each, [KEY]) for each in (1, 2, 3)))
     team.run(1.0)
@@ -51,7 +52,7 @@ def test_none_lost_while_keys_change(apart_s):
             assert heard == [CDR + n.to_bytes(4, "big") for n in range(1, flow.sent + 1)]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_lost_robot_delays_the_others_for_a_limited_time_and_is_out_then(monkeypatch):
     longest_s = 60.0
     monkeypatch.setattr(*CONSTANTS["longest_s"], longest_s)

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 import pytest
 import websocket
 
+from sdrlinkd.cli import run
 from tests.programs import sdrlinkctl
 from tests.web.conftest import page_of
 
@@ -115,11 +116,10 @@ def test_behind_a_proxy_its_name_counts(tmp_path):
         (("--fleet", "a", "--zenoh", "absent.json5", "--listen", "127.0.0.1:0"), "fleet.zenoh: "),
     ],
 )  # fmt: skip
-def test_what_would_be_unsafe_or_cannot_be_is_refused(options, said, tmp_path):
-    with sdrlinkctl("web", *options, folder=tmp_path) as process:
-        assert process.wait() == 2
-        assert said in process.err()
-        assert "Traceback" not in process.err()
+def test_what_would_be_unsafe_or_cannot_be_is_refused(options, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["web", *options]) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_beyond_this_host_it_warns(tmp_path):
