@@ -10,8 +10,8 @@ from benchmarks.team.turnaround import wait_for_turns
 from tests.laws import trials
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("to_all", [False, pytest.param(True, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("to_all", [False, True])
 def test_a_route_heals_in_time_and_nothing_is_lost(to_all):
     for seed in range(101, 101 + trials(3)):
         found = heal(seed, to_all=to_all)

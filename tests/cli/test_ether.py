@@ -156,7 +156,7 @@ def test_options_go_before_the_scenario(refused, monkeypatch, tmp_path):
     refused(scenario, "--dir", "air")
     refused(scenario, "--seed", 7, "--duration", 9, "--pace", "realtime", "--traces", tmp_path)
     (plain, where, *_), (changed, _, traces, _) = seen
-    assert (plain.seed, plain.duration_s, plain.pace) == (3, 3.0, "lockstep")
+    assert (plain.seed, plain.duration_s, plain.pace) == (3, 1.5, "lockstep")
     assert (changed.seed, changed.duration_s, changed.pace) == (7, 9.0, "realtime")
     assert (where, traces) == (Path("air"), tmp_path)
 

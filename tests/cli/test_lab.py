@@ -144,7 +144,7 @@ def test_without_options_the_scenario_is_as_written(lab, asked, tmp_path):
     assert lab(path)[0] == 0
     assert lab(path, "--access", "none")[0] == 0
     plain, changed = asked
-    assert (plain.scenario.duration_s, plain.scenario.seed) == (3.0, 4)
+    assert (plain.scenario.duration_s, plain.scenario.seed) == (1.5, 4)
     assert (plain.scenario.pace, plain.traces) == ("lockstep", None)
     assert plain.bag == tmp_path / "recordings/a"
     assert plain.scenario.daemon["access"] == {"policy": "tdma", "slot_s": 0.1}

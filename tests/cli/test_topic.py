@@ -4,14 +4,12 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from sdrlinkd.adapters import empty, to_cdr
-from sdrlinkd.cli import run
+from sdrlinkd.cli import main, run
 from sdrlinkd.cli.spans import Bandwidth, Delay, Rate
 from sdrlinkd.client import Publisher
 from sdrlinkd.process import Process, module, wait_until
@@ -128,18 +126,24 @@ def test_list_finds_a_directory_that_is_named_from_where_the_daemon_was_started(
         assert daemon.stop() == 0
 
 
-def completed(words, directory):
-    done = subprocess.run(
-        [sys.executable, "-c", "from sdrlinkd.cli import main; main()"],
-        env={"COMP_WORDS": words, "COMP_CWORD": str(words.count(" ")),
-             "_SDRLINKCTL_COMPLETE": "complete_bash", "SDRLINKD_RUNTIME_DIR": str(directory)},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    return done.stdout.split()
+@pytest.fixture
+def completed(monkeypatch, capsys):
+    """What bash is offered behind the last of these words."""
+
+    def ask(words, directory):
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", str(words.count(" ")))
+        monkeypatch.setenv("_SDRLINKCTL_COMPLETE", "complete_bash")
+        monkeypatch.setenv("SDRLINKD_RUNTIME_DIR", str(directory))
+        with pytest.raises(SystemExit):
+            main()
+        return capsys.readouterr().out.split()
+
+    return ask
 
 
 @pytest.mark.slow
-def test_tab_knows_live_names(daemon):
+def test_tab_knows_live_names(daemon, completed):
     with Publisher(daemon.directory) as out:
         out.send(ODOM, to_cdr(empty(KIND), KIND))
     wait_for(lambda: daemon.snapshot().link.received != [])
@@ -158,5 +162,5 @@ def test_tab_knows_live_names(daemon):
         assert completed(words, daemon.directory) == there, words
 
 
-def test_tab_is_silent_where_there_is_no_daemon(tmp_path):
+def test_tab_is_silent_where_there_is_no_daemon(tmp_path, completed):
     assert completed("sdrlinkctl set /rob", tmp_path) == []

@@ -112,7 +112,7 @@ def test_every_mcs_can_be_shown(tmp_path):
     assert (result["phy"]["mcs"], result["pdr"]) == ("256QAM 5/6", 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_clean_link_that_loses_messages_is_a_fault(tmp_path, monkeypatch, capsys):
     def lossy(*arguments):
         path = write_config(*arguments)

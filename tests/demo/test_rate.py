@@ -43,7 +43,7 @@ def test_a_third_of_the_time_stays_free_and_the_air_is_not_full(busy, air_at_5, 
     assert asked == [("ofdm", rate_hz) for rate_hz in (5e6, 2e6, 1e6, 5e5)[:n_tried]]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_is_measured_is_a_daemon_with_this_traffic():
     source = open_source(None, None, [], 15.0, 1)
     found = tried_out(source, Options(link="ofdm", rate_hz=2e6))

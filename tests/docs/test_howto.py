@@ -39,7 +39,7 @@ def reader(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", one_in(4, TYPED))
+@pytest.mark.parametrize("name", one_in(7, TYPED))
 def test_commands_work_and_show_what_is_printed(reader, name):
     text = (FOLDER / f"{name}.md").read_text()
     if not STARTS_ITS_OWN.search(text):

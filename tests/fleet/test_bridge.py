@@ -212,6 +212,7 @@ def test_a_robot_that_comes_over_is_not_sent_any_more(islands):
     assert 99 not in [n for each in {m.topic for m in far.messages} for n in far.numbers(each)]
 
 
+@pytest.mark.long
 def test_a_robot_takes_commands_over_a_bridge_only_from_both(islands):
     trusted = (("cmd_vel", [8]), ("imu", [1]), ("scan", [1, 8]))
     islands.start(["*"], at_4="".join(f"[topic.{name}]\nfrom = {ids}\n" for name, ids in trusted))

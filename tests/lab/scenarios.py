@@ -21,7 +21,7 @@ def scenario_text(
     """Two robots at 1 Msps that take turns; `top`, `robots` and `extra` are more TOML."""
     return f"""title = "Two small robots"
 pace = "{pace}"
-duration_s = 3.0
+duration_s = 1.5
 settle_s = 0.5
 {top}
 [air]

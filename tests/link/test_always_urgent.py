@@ -186,8 +186,8 @@ def test_in_an_auction_it_is_named_until_it_stops():
     assert named(access, end_s + 30) == set()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("who", one_in(2, [1, 3]))
+@pytest.mark.long
+@pytest.mark.parametrize("who", [1, 3])
 def test_with_turns_it_is_named_until_it_stops(who):
     """Robot 1 plans. It tells no requests, so the others do not know its own."""
     team, end_s = team_of(4, [who], FORMED_S, FORMED_S + 12), FORMED_S + 12

@@ -208,7 +208,7 @@ def faded_symbols(modulation, h, no, rng):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("modulation", one_in(4, reversed(Modulation)))
+@pytest.mark.parametrize("modulation", one_in(5, reversed(Modulation)))
 def test_a_channel_that_fades_is_followed(modulation):
     """Echoes rotate against each other: the band moves through its fades, as at 40 Hz and 5 Msps.
 
