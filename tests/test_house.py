@@ -104,10 +104,12 @@ def test_one_burst_is_decided_in_few_calls_and_files():
     assert (len(decided), len(set(decided))) <= (50, 12)
 
 
+@pytest.mark.slow
 def test_a_queued_messages_fields_are_written_by_itself_alone():
     assert not writes("sdrlinkd.link", "Outgoing")
 
 
+@pytest.mark.slow
 def test_rooms_of_the_link_import_down_and_reach_into_nobody():
     found = graph("sdrlinkd.link")
     assert (len(found.rooms), found.upward) == (19, [])

@@ -82,6 +82,7 @@ values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @law(300)
 @given(st.sampled_from(KINDS), st.dictionaries(names, values, max_size=3))
 def test_whatever_people_write_it_is_a_message_or_refused_in_words(kind, fields):

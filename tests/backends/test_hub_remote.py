@@ -43,6 +43,7 @@ def test_settings_that_name_one_hub_are_good(given):
     assert (ether.hub or ether.dir) in backend.unchecked(ether)[0]
 
 
+@pytest.mark.slow
 @law()
 @given(
     offset_s=st.floats(-1e6, 1e6),

@@ -76,6 +76,7 @@ def test_without_delay_there_is_nothing_to_correct():
     assert aware == pytest.approx(ignorant, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_ages_over_links_are_those_of_the_links_and_repeat_by_seed():
     one, again, other = (loop.run_loop(loop.OLD, "age", seed, 1.0) for seed in (1, 1, 2))
     assert np.array_equal(one.error_v, again.error_v)

@@ -32,6 +32,7 @@ def test_peers_that_are_not_there():
         run("carrier pigeon", seconds=1.0)
 
 
+@pytest.mark.slow
 def test_a_daemon_that_does_not_start_says_why():
     daemons = running("direct", [1], ["a"], "[link]\nnonsense = 1\n", "")
     with pytest.raises(PeerError, match=r"daemon_1: .*link\.nonsense: unknown key"), daemons:

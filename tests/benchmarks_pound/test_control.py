@@ -8,6 +8,7 @@ from benchmarks.peers.pound.ends import Told
 from benchmarks.peers.pound.namespaces import Network, Node
 
 
+@pytest.mark.slow
 def test_each_millisecond_of_delay_shows():
     errors = [control.rms_mv(control.undelayed(3000, delay)) for delay in range(21)]
     assert errors[0] == 0

@@ -387,6 +387,7 @@ def test_the_papers_tables():
     assert image.mdr_pct == 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_nodes", [2, 3])
 def test_flows_come_back_with_the_radio(n_nodes):
     found = reconnection_s(n_nodes, 1, 2, PAPER)
@@ -394,6 +395,7 @@ def test_flows_come_back_with_the_radio(n_nodes):
     assert 0 < max(found) < 0.3
 
 
+@pytest.mark.slow
 def test_something_urgent_waits_for_two_loops_at_most():
     waits = {}
     for n_nodes, carried in ((8, 2.2), (24, 0.3)):

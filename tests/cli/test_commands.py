@@ -28,6 +28,7 @@ def publish(daemon, count=3):
             out.send(ODOM, to_cdr(empty("nav_msgs/msg/Odometry"), "nav_msgs/msg/Odometry"))
 
 
+@pytest.mark.slow
 @pytest.mark.quick
 def test_status_for_people_and_programs(start_daemon, ctl):
     daemon = start_daemon()
@@ -63,6 +64,7 @@ def test_topics_check_reload(start_daemon, ctl):
     assert (code, "reloaded" in out) == (0, True)
 
 
+@pytest.mark.slow
 def test_pub_and_echo(daemon, ctl):
     dir_ = ("--runtime-dir", daemon.directory)
     done = threading.Event()
@@ -324,6 +326,7 @@ def test_pdu_decode_shows_the_layout(ctl, tmp_path):
     assert "allowed: octets" in err
 
 
+@pytest.mark.slow
 def test_pdu_watch_shows_both_directions(daemon):
     with sdrlinkctl("pdu", "watch", "-n", "4", "--runtime-dir", daemon.directory) as watch:
         while watch.is_running:

@@ -24,6 +24,7 @@ def echo():
         yield start
 
 
+@pytest.mark.slow
 def test_a_bad_message_is_shown_as_bad_and_the_next_one_as_it_is(daemon, echo):
     watch = echo(daemon, "/rx_robot_1/*", "-n", "4", "--timeout", "60")
     bad, good = bytes([0, 1, 0, 0]) + b"hello", to_cdr(empty(ODOM), ODOM)

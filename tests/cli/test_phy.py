@@ -79,6 +79,7 @@ def test_pictures_are_drawn(phy_ctl, tmp_path, monkeypatch, picture):
     assert other.is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "options", "told"),
     [
@@ -106,6 +107,7 @@ def test_a_recording_cut_in_mid_sample_is_read_as_far_as_it_goes(phy_ctl, tmp_pa
     assert "ends with 3 bytes, less than a ci16_le sample" in err
 
 
+@pytest.mark.slow
 def test_bad_input_is_refused_in_one_line(phy_ctl, tmp_path):
     (tmp_path / "what.dat").write_bytes(bytes(100))
     (tmp_path / "lone.sigmf-meta").write_text('{"global": {"core:datatype": "cf32_le"}}')
@@ -209,6 +211,7 @@ def test_a_recording_without_wifi_frames_is_said_to_have_none(phy_ctl, tmp_path)
     assert "missing.cf32" in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grid", ["64/16", "128/16"])
 def test_recordings_on_any_grid(phy_ctl, tmp_path, grid):
     rng = np.random.default_rng(4)

@@ -101,6 +101,7 @@ def test_bad_input_is_refused_in_one_line(ctl, tmp_path, arguments, says):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_frequency_and_rate_take_their_units(ctl, tmp_path):
     given = ("--device", "driver=none", "--frequency", "433 MHz", "--rate", "2 Msps")
     _, _, with_units = ctl("record", tmp_path / "rec", *given)

@@ -164,6 +164,7 @@ async def test_why_is_told_of_the_selected_topic():
         assert len(asked.requests) == 1
 
 
+@pytest.mark.slow
 async def test_a_policy_is_changed_and_what_is_refused_is_shown():
     asked = Asked()
     app = make_app(asked)

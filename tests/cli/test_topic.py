@@ -69,6 +69,7 @@ def measuring(daemon, *arguments):
     ("bw", r"\S+ [KM]?B/s from 50 messages\n\tMessage size mean: 708 B min: 708 B max: 708 B\n"),
     ("delay", r"average delay: \d\.\d{3}\n\tmin: \S+s max: \S+s std dev: \S+s window: 50\n"),
 ])  # fmt: skip
+@pytest.mark.slow
 def test_a_topic_heard_is_measured(daemon, what, pattern):
     told, size = measuring(daemon, what, HEARD, "--count", "50")
     assert size == 708
@@ -162,5 +163,6 @@ def test_tab_knows_live_names(daemon, completed):
         assert completed(words, daemon.directory) == there, words
 
 
+@pytest.mark.slow
 def test_tab_is_silent_where_there_is_no_daemon(tmp_path, completed):
     assert completed("sdrlinkctl set /rob", tmp_path) == []

@@ -31,6 +31,7 @@ def test_every_command_is_listed_with_its_own_help():
     assert typer.main.get_group(app).commands.keys() == COMMANDS.keys()
 
 
+@pytest.mark.slow
 def test_short_commands_wait_for_nothing_that_they_do_not_need():
     program = f"""
 import sys

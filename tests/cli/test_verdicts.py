@@ -146,6 +146,7 @@ class Terminal:
         return code
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("way", "code"), [("q", 0), ("\x03", 0), (signal.SIGTERM, 143)])
 def test_top_leaves_the_terminal_as_it_was(daemon, way, code):
     terminal = Terminal("top", "--runtime-dir", daemon.directory)

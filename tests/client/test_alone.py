@@ -63,6 +63,7 @@ def run_alone(python, daemon):
     assert out.endswith("modules\n")
 
 
+@pytest.mark.slow
 def test_the_language_is_python_3_10():
     call(VERMIN, "-t=3.10-", "--no-tips", "--violations", *FILES)
     call(sys.executable, "-m", "ruff", "check", "--isolated", "--target-version", "py310",

@@ -166,6 +166,7 @@ def test_a_daemon_plays_the_topics_of_a_bag_that_it_knows(start_daemon, tmp_path
     assert node.snapshot().link.tx.accepted == len(expected) == 20
 
 
+@pytest.mark.slow
 def test_a_bag_that_cannot_be_played_is_refused_in_one_line(write_config, tmp_path):
     config = write_config(tmp_path, '[play]\nbag = "none.mcap"\nduration_s = 1.0\n')
     with Process(module("sdrlinkd", "--config", config)) as daemon:

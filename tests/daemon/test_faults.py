@@ -32,6 +32,7 @@ def problems(daemon):
         return control.ask("check")["problems"]
 
 
+@pytest.mark.slow
 @pytest.mark.quick
 def test_message_out_message_in_and_the_snapshot_tells(start_daemon):
     daemon = start_daemon()

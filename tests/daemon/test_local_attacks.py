@@ -34,6 +34,7 @@ def test_a_message_of_256_mib_never_gets_into_memory(start_daemon):
     assert peak_kib < 200_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["lock", "folder"])
 def test_no_link_of_another_user_is_followed(write_config, tmp_path, what):
     """A link in place of the lock is refused, whoever made it; its target stays."""
@@ -80,6 +81,7 @@ def test_clients_do_not_talk_to_a_folder_that_another_user_prepared(tmp_path, mo
     assert not is_prepared(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["/dev/zero", "/", "/dev/null/x"])
 def test_a_configuration_that_is_none_is_refused_in_a_line(path):
     done = subprocess.run(

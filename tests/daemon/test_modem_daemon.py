@@ -48,6 +48,7 @@ def sent_and_heard(node, n):
     return got
 
 
+@pytest.mark.slow
 @pytest.mark.quick
 def test_messages_go_over_the_air_unchanged_with_ages_and_snr(start_daemon):
     node = start_daemon(LOOPBACK)
@@ -217,6 +218,7 @@ def test_a_link_works_where_no_memory_may_be_written_and_executed(start_daemon):
         assert heard.receive(20) is not None
 
 
+@pytest.mark.slow
 def test_a_check_loads_no_compiler(tmp_path):
     done = subprocess.run(
         [

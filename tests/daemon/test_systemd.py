@@ -167,6 +167,7 @@ def manager(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Manager]
         yield Manager(sock, tmp_path)
 
 
+@pytest.mark.slow
 def test_ready_means_reachable_for_the_group(manager: Manager):
     with manager.daemon():
         manager.wait_for("READY=1")

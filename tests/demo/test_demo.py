@@ -166,6 +166,7 @@ def test_a_bag_with_garbage_in_its_padding_arrives_unchanged(tmp_path, storage, 
     assert (result["pdr"], result["bytes_identical"], result["path_error_m"]) == (1.0, True, None)
 
 
+@pytest.mark.slow
 def test_bad_input_is_refused_in_words(tmp_path, capsys):
     (tmp_path / "junk.mcap").write_bytes(b"junk")
     (tmp_path / "file").write_text("")

@@ -178,6 +178,7 @@ def test_the_page_has_everything_and_names_are_text(tmp_path):
     assert "http" not in page.replace(HOSTILE, ""), "nothing is fetched from elsewhere"
 
 
+@pytest.mark.slow
 def test_report_writes_the_page_beside_the_drive(tmp_path, capsys):
     write(tmp_path, report(0), report(1))
     assert run(["report", str(tmp_path)]) == 0

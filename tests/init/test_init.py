@@ -282,6 +282,7 @@ def test_all_files_or_none(init, tmp_path):
     assert [each.name for each in (tmp_path / "team").iterdir()] == ["sdrlinkd.toml"]
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_asked_with_a_default(tmp_path, capsys):
     """On a terminal: a wrong answer is asked again, an empty one means the default."""
     ours, theirs = pty.openpty()

@@ -53,6 +53,7 @@ def test_a_title_is_shown_as_it_is(tmp_path):
     check(report(title=STRANGE), tmp_path / "lab.png", f"sdrlinkctl lab {STRANGE}")
 
 
+@pytest.mark.slow
 def test_a_drive_is_drawn_with_its_distance(tmp_path):
     moved = load_scenario(find_scenario(Path("out-and-back")))
     check(report(), tmp_path / "lab.png", "", moved)

@@ -56,6 +56,7 @@ def test_bursts_never_overlap_whoever_sends_whatever(n):
         assert not any(node.waiting for node in air.nodes.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 8, pytest.param(24, marks=pytest.mark.long)])
 def test_a_quiet_hand_over_takes_two_mini_slots_and_all_have_the_same_share(n):
     air = make_air(n, 1)
@@ -191,6 +192,7 @@ def test_after_long_silence_all_may_begin_at_once():
         air.assert_nobody_clashes()
 
 
+@pytest.mark.slow
 def test_the_others_go_on_if_the_robot_that_is_next_has_left():
     for seed in range(3):
         air = make_air(5, seed)
@@ -314,6 +316,7 @@ def test_nobody_waits_for_ever(most):
     air.assert_nobody_clashes()
 
 
+@pytest.mark.slow
 def test_who_is_next_with_something_more_urgent_needs_no_contest_with_itself():
     """A robot that fills the air with bulk has something urgent now and then; nobody else sends."""
     air = make_air(3, 5)

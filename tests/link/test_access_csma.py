@@ -36,6 +36,7 @@ def first_start(access, idle_since, qos=Qos.DEFAULT, earliest=0.0):
     raise AssertionError("it waits for ever")
 
 
+@pytest.mark.slow
 @radios
 @pytest.mark.parametrize("n", [2, 4])
 def test_nobody_begins_on_a_busy_channel_that_could_be_sensed(traits, n):
@@ -54,6 +55,7 @@ def test_nobody_begins_on_a_busy_channel_that_could_be_sensed(traits, n):
     assert late < 100
 
 
+@pytest.mark.slow
 @radios
 @pytest.mark.parametrize("n", [2, 4])
 def test_it_collides_less_than_without_access_though_sometimes(traits, n):

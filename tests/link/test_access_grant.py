@@ -195,6 +195,7 @@ def test_robots_join_without_a_clash_and_the_root_stays():
         assert len(team.clashes(4.0)) <= 3
 
 
+@pytest.mark.slow
 def test_a_team_that_has_nothing_to_send_is_quiet():
     team = Team([1, 2, 3, 4], 1)
     team.run(FORMED_S + 2)
@@ -380,6 +381,7 @@ def test_a_plan_fits_into_the_room_that_each_pdu_has(links):
     assert len(build_records(told)) + spare <= Grants.least_room
 
 
+@pytest.mark.slow
 def test_requests_that_do_not_fit_beside_a_plan_wait_for_the_next_pdu():
     nodes, far = [*range(1, 10)], [*range(3, 10)]
     relay = make_access(params("grant", nodes), 2, TRAITS, LONGEST_S, Random(1))
@@ -421,6 +423,7 @@ def test_no_round_is_longer_than_the_longest(links):
         assert max(b - a for a, b in pairwise(begins)) <= root.access.round_s
 
 
+@pytest.mark.slow
 def test_where_a_burst_has_a_single_pdu_the_root_sends_too():
     team = saturated(3, 2, traits=TRAITS._replace(longest_burst_s=(PDU_S,)))
     team.run(FORMED_S + 2)
@@ -467,6 +470,7 @@ def test_what_is_expected_starves_nobody(node, every_s, has_bulk):
         assert longest_s <= 2 * root.round_s + 0.25 * (other == ANYBODY)
 
 
+@pytest.mark.slow
 @law()
 @given(st.lists(told_events, max_size=40), st.integers(1, 3))
 def test_whatever_is_told_turns_stay_within_bounds(events, own_id):
@@ -487,6 +491,7 @@ def test_whatever_is_told_turns_stay_within_bounds(events, own_id):
     assert all(isinstance(each, str) for each in access.notices(now))
 
 
+@pytest.mark.slow
 def test_who_sends_in_no_turns_is_told_of():
     """Robot 3 sends at random, robot 2 in its turns, of which plans were not heard now and then."""
     team = Team([1, 2, 3], 4, loss=0.05, joins={3: 1e6})

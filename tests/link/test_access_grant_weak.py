@@ -50,6 +50,7 @@ def test_a_root_that_is_gone_is_replaced_though_the_air_is_never_silent():
     assert longest_silence_s(team, 3, 7.0) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("teller", "planner"), [(2, 4), (3, 1)])
 def test_who_told_the_plans_of_a_root_is_followed_to_another_one(teller, planner):
     """Robot 2 tells no more of root 1, as it follows root 4, though that one is farther away."""
@@ -60,6 +61,7 @@ def test_who_told_the_plans_of_a_root_is_followed_to_another_one(teller, planner
     assert f"planned by robot {planner}, 2 hops away" in access.state
 
 
+@pytest.mark.slow
 def test_over_a_link_that_loses_some_bursts_a_team_forms_all_the_same():
     team = Team((1, 2), 1, links=[], weak=[(1, 2)], luck=0.8)
     team.run(8.0)

@@ -99,6 +99,7 @@ def test_clocks_may_drift_apart_while_nobody_sends():
         air.assert_nobody_clashes()
 
 
+@pytest.mark.slow
 @radios
 def test_a_burst_that_some_could_not_read_leads_to_no_collision(traits):
     for seed in range(8):

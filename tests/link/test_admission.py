@@ -184,6 +184,7 @@ def test_noise_of_the_links_does_not_take_air_from_a_flow():
     assert costs == pytest.approx([13_000 / 32768 * cost for cost in (1.5, 1.5, 1.5, 2.0, 2.0)])
 
 
+@pytest.mark.slow
 def test_the_lowest_class_gives_way_and_comes_back():
     air = team(robots=(1, 2), hears={(1, 2), (2, 1)})
     reserve(air, 2, 0.5, "bulk")
@@ -221,6 +222,7 @@ def test_a_team_without_relays_agrees_too():
     assert all_agree(air) == {(1, 0): True, (2, 0): False}
 
 
+@pytest.mark.slow
 def test_a_robot_that_restarts_is_believed_at_once():
     air = team(robots=(1, 2), hears={(1, 2), (2, 1)})
     reserve(air, 2, 0.5)

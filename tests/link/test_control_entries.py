@@ -1,6 +1,7 @@
 """Unreadable control entries of other robots only affect themselves."""
 
-from hypothesis import given, settings
+import pytest
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import PduError
@@ -17,6 +18,7 @@ from sdrlinkd.wire import (
     parse_records,
     postponed,
 )
+from tests.laws import law
 from tests.link.world import make_link, neighbors, rx
 
 SIZE = 220
@@ -55,7 +57,8 @@ payloads = st.binary(max_size=60) | st.builds(
 foreign = st.builds(control, payloads, st.sampled_from([1, 1, 1, 2, 255]))
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@pytest.mark.slow
+@law(300)
 @given(st.lists(st.lists(foreign, min_size=1, max_size=2), min_size=1, max_size=6), st.booleans())
 def test_whatever_is_said_on_topic_15_the_message_beside_it_is_delivered(cases, behind):
     link = make_link(2, pdu_size=SIZE)
@@ -113,7 +116,8 @@ def test_with_sixteen_topics_there_is_nothing_to_be_read():
     assert rx(link).control_bad == 0
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@pytest.mark.slow
+@law(200)
 @given(st.lists(foreign, min_size=1, max_size=3), st.integers(0, 10_000_000))
 def test_a_relay_sends_on_as_it_is_what_it_cannot_read(foreigners, by_us):
     octets = pdu([*foreigners, data()], hop=3)

@@ -70,6 +70,7 @@ def test_beside_a_registry_both_kinds_share_pdus():
     assert one.declare(Offer("/scan", "sensor_msgs/LaserScan")).id == 0
 
 
+@pytest.mark.slow
 @law(30)
 @given(
     names=st.lists(st.from_regex(r"[a-z]{1,6}(/[a-z]{1,6})?", fullmatch=True), min_size=1,

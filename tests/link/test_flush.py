@@ -3,7 +3,7 @@
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import (
@@ -17,6 +17,7 @@ from sdrlinkd.link import (
     flush_told,
 )
 from sdrlinkd.wire import ENTRY_HEADER_SIZE, Beacon, Clock, Receipt, equal_payload
+from tests.laws import law
 from tests.link.world import (
     compose,
     layouts,
@@ -174,7 +175,8 @@ class TestWithoutEnd:
         assert link.audit() == far.audit() == []
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@pytest.mark.slow
+@law(40)
 @given(st.integers(0, 2**32), st.sampled_from([NEVER, 0.05]))
 def test_whatever_waits_goes_with_the_rest_or_at_the_end(seed, flush_s):
     """Nothing is stuck: a queued message leaves at the latest when the node stops."""

@@ -189,6 +189,7 @@ def test_without_numbers_it_is_refused_and_its_parts_are_of_an_unknown_topic():
     assert set(rx(plain).dropped) <= {"rx_unknown_topic", "rx_partial_timeout"}
 
 
+@pytest.mark.slow
 def test_memory_holds_for_parts_too():
     limits = ReassemblyParams(source_bytes=1 << 18, total_bytes=1 << 19)
     receiver = make_link(2, pdu_size=1024, has_numbers=True, reassembly=limits)
@@ -238,6 +239,7 @@ def test_between_two_parts_it_ends_with_no_entry_id():
     assert sender.audit() == receiver.audit() == []
 
 
+@pytest.mark.slow
 def test_a_stream_of_large_messages_names_the_one_that_lost_a_part():
     sender, receiver = pair()
     got = []

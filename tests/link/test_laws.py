@@ -39,6 +39,7 @@ def any_policy(rng):
     )
 
 
+@pytest.mark.slow
 @law(40)
 @given(st.integers(0, 2**32))
 def test_the_ledger_holds_at_every_step_of_any_run(seed):

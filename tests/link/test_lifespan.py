@@ -149,6 +149,7 @@ def test_why_and_the_report_tell_which():
     ]
 
 
+@pytest.mark.slow
 def test_an_overloaded_air_hands_over_nothing_old_of_class_latency():
     """Twice as many messages are submitted as the air can carry."""
     sender, receiver = make_link(1, pdu_size=64), make_link(2, pdu_size=64)

@@ -68,6 +68,7 @@ def test_two_hearers_that_lose_different_pdus_name_messages_alike():
     assert both > 80 * often(3)
 
 
+@pytest.mark.slow
 def test_after_a_restart_of_the_source_its_messages_have_other_names():
     air = Named(7, 0.1)
     for number in range(60):

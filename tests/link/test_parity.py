@@ -100,6 +100,7 @@ def test_records_that_contradict_their_message_or_themselves_do_no_harm():
     assert len(got) > 280
 
 
+@pytest.mark.slow
 def test_parity_of_a_message_that_is_complete_is_no_part_of_the_next():
     """Entry ids are reused, and images often have the same size."""
     rng = Random(5)

@@ -19,6 +19,7 @@ def flow(air, src, s):
     air.flow(src, round(s / every_s), every_s=every_s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("needed_db", "least", "most"), [(16.0, 0.9, 1.0), (16.5, 0.0, 0.7)])
 def test_what_is_missed_while_a_robot_is_away_counts_at_the_edge_of_range_only(
     needed_db, least, most
@@ -35,6 +36,7 @@ def test_what_is_missed_while_a_robot_is_away_counts_at_the_edge_of_range_only(
     assert least < share(air, 1, of=2) <= most
 
 
+@pytest.mark.slow
 def test_what_came_through_a_relay_only_was_lost_on_the_link():
     air = mesh((1, 2), (1, 3), (2, 3))
     flow(air, 2, 3.0)

@@ -94,6 +94,7 @@ def test_nobody_knows_anybody_so_the_first_burst_is_the_slowest():
     assert {burst.mcs for _, _, burst in world.bursts} == {0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", [BROADCAST, 2])
 def test_the_mcs_follows_a_falling_and_a_rising_snr(to):
     def snr_db(_to, _src, now):
@@ -124,6 +125,7 @@ def test_losses_that_snr_does_not_tell_make_it_cautious():
     assert there(world, 1, 2)[1] > 0.1
 
 
+@pytest.mark.slow
 def test_a_robot_that_falls_silent_is_spoken_to_slowly():
     def snr_db(_to, src, now):
         return -50.0 if src == 2 and now > 10 else 25.0

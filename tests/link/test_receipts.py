@@ -181,6 +181,7 @@ def test_of_all_robots_asked_the_last_one_is_told_of_as_such():
     assert told == [("one", 2, 1), ("one", 3, 0), ("two", 2, 1), ("two", 3, 0)]
 
 
+@pytest.mark.slow
 def test_a_receipt_is_for_the_message_that_had_the_entry_id_then():
     """Entry ids are reused after 256 messages."""
     air = Air(5, (1, 2), pdu_size=128)

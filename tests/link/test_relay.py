@@ -149,6 +149,7 @@ def test_a_relay_does_not_keep_what_is_old():
     assert two.audit() == []
 
 
+@pytest.mark.slow
 @law(30)
 @given(st.integers(0, 2**32))
 def test_in_any_mesh_messages_arrive_once_and_the_ledgers_add_up(seed):

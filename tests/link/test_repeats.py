@@ -165,6 +165,7 @@ def test_fragments_come_again_while_their_message_is_waited_for():
     assert sorted(air.numbers(2)) == list(range(20))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parity", [0.0, 0.2])
 def test_what_is_lost_inside_a_long_message_comes_though_that_one_is_complete(parity):
     """An urgent message goes between two bursts of a long one; each time, all of it is lost."""

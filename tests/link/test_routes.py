@@ -122,6 +122,7 @@ def test_a_far_robot_that_restarts_is_believed_though_its_numbers_begin_anew():
         assert sum(n >= 1000 * seed for n in air.numbers(3)) == 10
 
 
+@pytest.mark.slow
 def test_what_is_only_for_neighbours_is_not_forwarded_and_receipts_are():
     air = mesh((1, 2), (2, 3))
     air.run(5.0)
@@ -236,6 +237,7 @@ def test_tables_are_bounded_whatever_is_told():
     assert link.audit() == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pairs", [[(1, 2)], [(1, 3), (3, 2)]])
 def test_the_first_pdu_of_a_flow_is_repeated_if_nobody_answers(pairs):
     """A single message is a flow of one PDU, and nothing after it shows that it is missing."""

@@ -42,6 +42,7 @@ def test_a_detour_does_not_lead_back_to_the_source():
     assert late_s < 0.5
 
 
+@pytest.mark.slow
 def test_no_detour_over_links_that_lose_nearly_all():
     """Robot 1 does not hear what 2 forwards and answers. All the same, 2 is the way."""
     rng = Random(1)

@@ -3,6 +3,7 @@
 from collections import Counter
 from itertools import pairwise, permutations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -80,6 +81,7 @@ def test_pdus_of_the_last_second_are_forwarded_after_all():
     assert forwarded(named_late(teller=2, at=1.1), 1.15) == []
 
 
+@pytest.mark.slow
 def test_who_forwards_before_its_teller_answers_all_the_same():
     """Robot 3 hears robot 1, which does not hear it. Its copies have as many hops as those of 2."""
     air = mesh((1, 2), (2, 3), (3, 4))
@@ -94,6 +96,7 @@ def test_who_forwards_before_its_teller_answers_all_the_same():
     assert max(copies.values()) == 1
 
 
+@pytest.mark.slow
 def test_a_robot_that_answers_for_others_may_still_not_know_that_it_is_named():
     """Robots 2 and 4 answer for PDUs to everyone, and with that for all PDUs of robot 1."""
     left = [1]

@@ -2,6 +2,8 @@
 
 import re
 
+import pytest
+
 from sdrlinkd.link import Outcome, Overrides, Qos, QueueParams, Told, TopicPolicy
 from tests.link.world import make_link, next_burst
 
@@ -49,6 +51,7 @@ def test_drops_under_a_policy_that_is_no_longer_set():
     assert any("by a depth that is no longer set (tx_superseded, " in each for each in told)
 
 
+@pytest.mark.slow
 def test_a_topic_that_is_shed_says_what_the_air_was_used_for():
     link = make_link(pdu_size=64, queue=QueueParams(max_messages=10))
     link.set_policies({0: TopicPolicy(qos="bulk"), 1: TopicPolicy(qos="urgent")})

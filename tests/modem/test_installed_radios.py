@@ -177,6 +177,7 @@ def test_a_package_that_is_broken_is_named(install, name):
     assert parse_config('backend = "loopback"').backend == "loopback"
 
 
+@pytest.mark.slow
 async def test_a_radio_whose_code_is_missing_is_told_when_it_is_opened(install):
     text = EXAMPLE.replace('make="acme_radio:', 'make="acme_driver:')
     install("acme-sdr", {"acme": "acme_radio:ENTRY"}, acme_radio=text)

@@ -95,6 +95,7 @@ def has_contact(data):
     return any(isinstance(record, Contact) for record in records)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off_s", [0.0, 1.0, 25.0, 29.0])
 def test_a_new_life_does_not_pass_for_the_old_one(off_s):
     """All of it comes so late that its leap in T would not show, and its CONTACTs never come."""

@@ -170,6 +170,7 @@ def test_clear_is_accepted_on_request_but_not_from_who_sealed_once():
         team.robots[1].disk = team.robots[1].sealing.memory.at_stop()
 
 
+@pytest.mark.slow
 def test_another_robot_with_our_id_and_key_stops_us():
     team = Team(Robot(1, [KEY]), Robot(2, [KEY]))
     team.run(40.0)
@@ -194,6 +195,7 @@ def test_another_robot_with_our_id_and_key_stops_us():
     assert security(team, 1).halted == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off_s", [15.0, 25.0, 70.0])
 def test_after_an_outage_one_way_messages_come_again_at_once(off_s):
     """The receiver has to ask for a proof again, and the sender does not know."""

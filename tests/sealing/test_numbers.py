@@ -66,6 +66,7 @@ def test_a_full_disk_stops_sealing_before_the_floor_and_says_so():
     assert any(src == 1 for _, src, _ in team.on_air[n:])
 
 
+@pytest.mark.slow
 def test_a_key_is_used_up():
     near_end = Remembered({KEY.fingerprint: N_TICKS - 32 * 60}, {}, KEY.fingerprint)
     team = Team(Robot(1, [KEY], disk=near_end), Robot(2, [KEY]))

@@ -1,5 +1,7 @@
 """The last ten minutes of a station, once a second."""
 
+import pytest
+
 from sdrlinkd.reports import ClockReport
 from sdrlinkd.web.testing import (
     KEPT_S,
@@ -56,6 +58,7 @@ def test_a_daemon_that_is_away_leaves_a_gap_and_one_that_restarts_counts_anew():
     assert lines(history, "queue")["bulk"] == [0, None, 0, 0]
 
 
+@pytest.mark.slow
 def test_it_is_bounded():
     history = History()
     for second in range(KEPT_S + 50):

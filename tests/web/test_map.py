@@ -78,6 +78,7 @@ def test_the_better_topic_wins_and_the_other_one_steps_in_when_it_falls_silent()
     assert place("fix", FIX, fix(0, 0), 9.0) == "fix"
 
 
+@pytest.mark.slow
 @law(60)
 @given(st.integers(1, 5000), st.floats(0.001, 50))
 def test_a_path_is_thinned_and_ends_where_the_robot_is(n, step_m):

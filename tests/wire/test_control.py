@@ -39,11 +39,11 @@ from sdrlinkd.wire import (
     build_records,
     parse_records,
 )
-from tests.laws import law
+from tests.laws import law, trials
 from tests.wire.vectors import RECORDS
 
 SEED = 6
-CASES = 20_000
+CASES = trials(20_000)
 
 # Number of octets that the fields of each type need (clause 6).
 NEED = {

@@ -10,16 +10,17 @@ from hypothesis import strategies as st
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire import Entry, Pdu, build, entry_budget, identity, parse
-from tests.laws import law
+from tests.laws import law, trials
 from tests.wire.pdus import sized_pdus
 from tests.wire.vectors import BY_NAME, PDUS, crc16_xmodem, reseal
 
 REASONS = {"rx_short", "rx_crc", "rx_version", "rx_flags", "rx_entry", "rx_pad"}
 HOP_BITS = range(4 * 8, 4 * 8 + 4)
-CASES = 100_000
+CASES = trials(100_000)
 SEED = 20250908
 
 
+@pytest.mark.slow
 @law(400)
 @given(sized_pdus())
 def test_parse_undoes_build(case):

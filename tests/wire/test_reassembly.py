@@ -68,6 +68,7 @@ def arrivals(draw):
     return messages, events
 
 
+@pytest.mark.slow
 @law(300)
 @given(arrivals())
 def test_any_order_with_copies_yields_exactly_the_messages(case):

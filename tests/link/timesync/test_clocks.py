@@ -87,6 +87,7 @@ def test_a_crystal_that_is_far_off_is_followed(ppm):
     assert pair.one.peers[2].estimate(pair.at).skew == pytest.approx(1e-6 * ppm, abs=2e-6)
 
 
+@pytest.mark.slow
 def test_a_host_clock_that_is_set_is_followed_at_once_here_and_after_a_minute_there():
     """Who sets another robot's clock by an hour may be somebody else, in its name."""
     pair = Pair()

@@ -68,6 +68,7 @@ def test_a_clock_that_jumps_is_followed_within_five_seconds(step_s):
     assert envelope.steps == 1
 
 
+@pytest.mark.slow
 def test_single_bad_stamps_are_counted_and_change_nothing():
     rng = Random(SEED)
     good, bad = DualEnvelope(RESOLUTION_S), DualEnvelope(RESOLUTION_S)

@@ -13,7 +13,7 @@ from benchmarks.timesync.moving import MOTIONS, moving
 from benchmarks.timesync.runs import follow
 from sdrlinkd.link import DualEnvelope
 from sdrlinkd.link.timesync import WINDOW_S, Wander
-from tests.laws import law
+from tests.laws import law, one_in
 
 SEED = 5
 HELD_PCT = 99.9
@@ -46,13 +46,15 @@ def held_pct(found, name):
     return 100 * good / n
 
 
-@pytest.mark.parametrize("name", sorted(LENGTHS_S.keys() - {"rate_jump_20ppm"}))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", one_in(4, sorted(LENGTHS_S.keys() - {"rate_jump_20ppm"})))
 def test_the_bound_holds_while_the_frequency_moves(name):
     found, _ = course(name)
     assert held_pct(found, name) >= HELD_PCT, f"seed {SEED}"
     assert np.nanmedian(found.bound_s) < (3e-6 if MOTIONS[name].by_sample else 1e-4)
 
 
+@pytest.mark.slow
 def test_the_bound_holds_10_s_after_a_jump_that_takes_so_long_to_be_seen():
     """20 µs a second, where a delay of 50 µs is usual."""
     found, _ = course("rate_jump_20ppm")
@@ -67,6 +69,7 @@ def test_without_wander_it_would_not(name, monkeypatch):
     assert held_pct(found, name) < HELD_PCT
 
 
+@pytest.mark.slow
 def test_a_rate_that_jumps_is_known_again_with_fewer_samples():
     found, envelope = course("rate_jump_200ppm")
     assert envelope.narrowed + envelope.steps > 0
@@ -85,6 +88,7 @@ def test_the_bound_of_a_steady_clock_is_little_more_than_its_stamps_resolution()
     assert 2e-5 < envelope.estimate.bound_s < 4e-5
 
 
+@pytest.mark.slow
 def test_stamps_that_are_worse_than_their_resolution_widen_the_bound_and_drop_nothing():
     rng = Random(SEED)
     envelope = DualEnvelope(2e-5)
