@@ -16,3 +16,10 @@ def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
         assert looked < began + timeout_s, "waited in vain"
         # What is waited for needs the processor more than who asks for it.
         time.sleep(max(SHORTEST_S, min(LONGEST_S, LONGER * (looked - began))))
+
+
+def again_and_again(act: Callable[[], object], *, while_: Callable[[], object]) -> None:
+    """Act until the condition ends; nobody who comes late misses it, and the processor rests."""
+    while while_():
+        act()
+        time.sleep(SHORTEST_S)

@@ -4,6 +4,7 @@ import contextlib
 import json
 import re
 import threading
+from functools import partial
 
 import msgspec
 import pytest
@@ -15,7 +16,7 @@ from sdrlinkd.reports import Snapshot
 from tests.adapters.recordings import ros2_bag
 from tests.programs import sdrlinkctl
 from tests.sealing.vectors import VECTORS
-from tests.waiting import wait_for
+from tests.waiting import again_and_again, wait_for
 from tests.wire.vectors import BY_NAME, DOCUMENTED
 
 ODOM = "/robot_1/odom"
@@ -153,8 +154,8 @@ def test_what_others_send_is_shown_as_it_is(start_daemon, tmp_path):
         sdrlinkctl("echo", "-n", "1", "--runtime-dir", daemon.directory) as echo,
         Publisher(daemon.directory) as out,
     ):
-        while echo.is_running:
-            out.send("/robot_1/say", to_cdr(message, "std_msgs/msg/String"))
+        say = partial(out.send, "/robot_1/say", to_cdr(message, "std_msgs/msg/String"))
+        again_and_again(say, while_=lambda: echo.is_running)
     assert "[bold]not[/odom] markup" in echo.out()
 
 
@@ -329,8 +330,7 @@ def test_pdu_decode_shows_the_layout(ctl, tmp_path):
 @pytest.mark.slow
 def test_pdu_watch_shows_both_directions(daemon):
     with sdrlinkctl("pdu", "watch", "-n", "4", "--runtime-dir", daemon.directory) as watch:
-        while watch.is_running:
-            publish(daemon, 1)
+        again_and_again(lambda: publish(daemon, 1), while_=lambda: watch.is_running)
     assert "→ src 1 dst all" in watch.out()
     assert "← src 1 dst all" in watch.out()
 

@@ -7,7 +7,7 @@ import pytest
 from sdrlinkd.adapters import empty, to_cdr
 from sdrlinkd.client import Publisher
 from tests.programs import sdrlinkctl
-from tests.waiting import wait_for
+from tests.waiting import again_and_again, wait_for
 
 ODOM = "nav_msgs/msg/Odometry"
 
@@ -29,10 +29,10 @@ def test_a_bad_message_is_shown_as_bad_and_the_next_one_as_it_is(daemon, echo):
     watch = echo(daemon, "/rx_robot_1/*", "-n", "4", "--timeout", "60")
     bad, good = bytes([0, 1, 0, 0]) + b"hello", to_cdr(empty(ODOM), ODOM)
     with Publisher(daemon.directory) as out:
-        while watch.is_running:
-            out.send("/robot_1/odom", bad)
-            out.send("/robot_1/odom", good)
-            out.flush()
+        again_and_again(
+            lambda: [out.send("/robot_1/odom", each) for each in (bad, good)],
+            while_=lambda: watch.is_running,
+        )
     shown = watch.out()
     assert (watch.code, watch.err()) == (0, "")
     assert shown.count("(bad message of 9 bytes, not valid CDR of nav_msgs/msg/Odometry: ") == 2

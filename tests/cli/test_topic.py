@@ -14,7 +14,7 @@ from sdrlinkd.cli.spans import Bandwidth, Delay, Rate
 from sdrlinkd.client import Publisher
 from sdrlinkd.process import Process, module, wait_until
 from tests.programs import sdrlinkctl
-from tests.waiting import wait_for
+from tests.waiting import again_and_again, wait_for
 
 ODOM = "/robot_1/odom"
 HEARD = "/rx_robot_1/odom"
@@ -58,8 +58,7 @@ def measuring(daemon, *arguments):
         sdrlinkctl("topic", *arguments, "--runtime-dir", daemon.directory) as topic,
         Publisher(daemon.directory) as out,
     ):
-        while topic.is_running:
-            out.send(ODOM, message)
+        again_and_again(lambda: out.send(ODOM, message), while_=lambda: topic.is_running)
     assert topic.code == 0, topic.err()
     return topic.out(), len(message)
 

@@ -14,7 +14,7 @@ from tests.backends.hubs import RawRadio, ask, serving
 from tests.daemon.ether import AIR
 from tests.waiting import wait_for
 
-BLOCK_S = AIR["block_s"]
+BLOCK_S = 0.001
 HASTY = "import backends.ether.radio as radio; radio.ANSWER_MS = 100; "
 
 
@@ -124,7 +124,8 @@ def test_what_is_planned_leaves_at_its_time_by_the_airs_clock(start_daemon, tmp_
     plan = list(due_messages(BuiltInRobot("robot_1", 0.5, 1), 0.5, 0.3, {"/robot_1/cmd_vel": 3}))
     radios = dict.fromkeys((1, 2, 3), RadioParams())
     play = "[play]\nduration_s = 0.5\nbegin_s = 0.3\nwait_for_consumer = true\n"
-    with serving(hub, radios, paced=False, until_s=1.0, **AIR), Conductor(hub) as conductor:
+    air = AIR | {"block_s": BLOCK_S}
+    with serving(hub, radios, paced=False, until_s=1.0, **air), Conductor(hub) as conductor:
         sender = start_daemon(on_ether(hub, 1, 'topics = ["cmd_vel"]\n') + play)
         receiver = start_daemon(on_ether(hub, 2))
         wait_for(lambda: set(ask(hub).nodes) == {1, 2, 3}, 60)

@@ -38,7 +38,7 @@ def test_plans_that_are_read_by_luck_silence_nobody(seed):
         assert longest_silence_s(team, node, 6.0) < 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_root_that_is_gone_is_replaced_though_the_air_is_never_silent():
     """The others cannot read robots 4 and 5, and hear them all the time."""
     weak = [(a, b) for a in (2, 3) for b in (4, 5)]

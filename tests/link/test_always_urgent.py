@@ -129,8 +129,8 @@ def turns_s(team, since):
     return used_s
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("root_too", one_in(2, [False, True]))
+@pytest.mark.long
+@pytest.mark.parametrize("root_too", [False, True])
 def test_with_turns_those_who_always_want_urgent_share_the_air(root_too):
     chatty = (1, 2, 4) if root_too else (2, 4, 5)
     team = team_of(6, chatty, FORMED_S, FORMED_S + 8)

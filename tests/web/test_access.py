@@ -122,12 +122,14 @@ def test_what_would_be_unsafe_or_cannot_be_is_refused(options, said, tmp_path, m
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_beyond_this_host_it_warns(tmp_path):
     with served("--listen", "0.0.0.0:0", folder=tmp_path) as (url, process):
         assert get(url, Host="base:8420")[0] == 200
         assert "whoever reaches this port can read the page" in process.err()
 
 
+@pytest.mark.long
 def test_it_is_served_over_tls(tmp_path):
     subprocess.run(
         ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1",

@@ -100,6 +100,7 @@ def hover_all(browser):
             )
 
 
+@pytest.mark.long
 def test_what_cannot_be_asked_is_said(page, open_browser):
     browser = open_browser(page[0])
     browser.tab("Topics")
