@@ -1,0 +1,25 @@
+"""What tests look at, piece by piece; not part of the interface."""
+
+from sdrlinkd.link.receive.acceptance import Acceptance
+from sdrlinkd.link.receive.air_heard import AirHeard
+from sdrlinkd.link.receive.handover import Handover
+from sdrlinkd.link.receive.heard_records import HeardRecords
+from sdrlinkd.link.receive.recorded import OwnPdus, RecentCommands
+from sdrlinkd.link.receive.repeated import Repeated, RepeatedPdus
+from sdrlinkd.link.receive.rx_ledger import Held, RxLedger
+from sdrlinkd.link.receive.undeclared import UndeclaredMessages, Whole
+
+__all__ = [
+    "Acceptance",
+    "AirHeard",
+    "Handover",
+    "HeardRecords",
+    "Held",
+    "OwnPdus",
+    "RecentCommands",
+    "Repeated",
+    "RepeatedPdus",
+    "RxLedger",
+    "UndeclaredMessages",
+    "Whole",
+]
