@@ -4,6 +4,7 @@ from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.air_heard import AirHeard
 from sdrlinkd.link.receive.handover import Handover
 from sdrlinkd.link.receive.heard_records import HeardRecords
+from sdrlinkd.link.receive.pdu_read import PduRead
 from sdrlinkd.link.receive.recorded import OwnPdus, RecentCommands
 from sdrlinkd.link.receive.repeated import Repeated, RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import Held, RxLedger
@@ -16,6 +17,7 @@ __all__ = [
     "HeardRecords",
     "Held",
     "OwnPdus",
+    "PduRead",
     "RecentCommands",
     "Repeated",
     "RepeatedPdus",
