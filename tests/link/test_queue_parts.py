@@ -486,10 +486,11 @@ REGISTRY = make_registry([("odom", "nav_msgs/Odometry"), ("scan", "sensor_msgs/L
 
 
 def intake(has_numbers=True, classes=None, outbox=None, **more):
-    return Intake(
-        LinkParams(pdu_size=64), OwnTopics(REGISTRY, has_numbers, 100), Outbox(PLENTY) if outbox is None else outbox,
-        classes or ClassesParams(), {}, 65_535, **more,
-    )  # fmt: skip
+    if outbox is None:
+        outbox = Outbox(PLENTY)
+    topics = OwnTopics(REGISTRY, has_numbers, 100)
+    params = LinkParams(pdu_size=64)
+    return Intake(params, topics, outbox, classes or ClassesParams(), {}, 65_535, **more)
 
 
 def next_of(made, outbox, *args, **more):
@@ -549,7 +550,6 @@ def test_large_messages_are_parted_evenly_with_the_parity_of_their_class():
         assert made.submit(0, bytes(largest + 1), 0.0) == "tx_too_big"
         assert made.submit(0, bytes(largest), 0.0) is None
         assert made.tally(0).dropped == {"tx_too_big": 1}
-        assert made.audit() == []
 
 
 def test_latched_messages_are_queued_again_while_they_live():
