@@ -330,6 +330,8 @@ def put_all(limits, policy, *messages, bytes_per_s=inf):
     ("limits", "policy", "bytes_per_s", "sizes", "dropped"),
     [
         ({"max_messages": 2}, {}, inf, [1, 1], {}),
+        ({"max_bytes": 20}, {}, inf, [20], {}),
+        ({"max_bytes": 20}, {}, inf, [5, 20], {0: "tx_overflow_old"}),
         ({"max_messages": 2}, {}, inf, [1, 1, 1], {0: "tx_overflow_old"}),
         ({"max_bytes": 20}, {}, inf, [10, 10], {}),
         ({"max_bytes": 20}, {}, inf, [10, 10, 1], {0: "tx_overflow_old"}),
@@ -517,6 +519,14 @@ def test_a_message_is_treated_as_its_producer_wishes_and_else_as_its_topic():
     assert made.lifespan(0) == (4.0, "topic")
     assert made.lifespan(1, Qos.URGENT) == (1.0, "class")
     assert made.lifespan(1) == (inf, "")
+
+
+def test_a_message_whose_lifespan_is_over_is_not_queued():
+    made = intake()
+    for age_s, refused in ((1.5, "tx_expired"), (1.25, None)):
+        wishes = Overrides(age_s=age_s, lifespan_s=1.5)
+        assert made.submit(0, b"data", 8.0, wishes) == refused
+    assert made.tally(0).dropped == {"tx_expired": 1}
 
 
 @pytest.mark.parametrize(

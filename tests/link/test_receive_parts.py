@@ -25,9 +25,11 @@ from sdrlinkd.link.receive import (
 from sdrlinkd.link.receive.testing import (
     Acceptance,
     AirHeard,
+    Completion,
     Handover,
     HeardRecords,
     Held,
+    Origin,
     OwnPdus,
     RecentCommands,
     RepeatedPdus,
@@ -49,6 +51,7 @@ from sdrlinkd.wire import (
     LinkReport,
     Parity,
     Pdu,
+    PduBuilder,
     Receipt,
     RegistryDigest,
     Repeat,
@@ -57,9 +60,12 @@ from sdrlinkd.wire import (
     Waits,
     Want,
     Wanted,
+    build_records,
     make_registry,
+    pieces,
 )
 from tests.laws import law
+from tests.link.world import make_link
 
 TOPICS = make_registry([("odom", "nav_msgs/Odometry"), ("cmd_vel", "geometry_msgs/Twist")])
 FULL = make_registry([(f"t{i}", "a/B") for i in range(16)])
@@ -536,8 +542,6 @@ def test_receipts_and_demand_count_where_they_concern_this_robot():
     digest, neighbor = RegistryDigest(bytes(8), b""), Neighbor(9)
     assert records_of(digest, neighbor=neighbor, is_proven=False)[0] == []
     assert neighbor.digest == digest
-    from sdrlinkd.wire import pieces
-
     (piece,) = pieces(20, ABOUT, 200)
     assert records_of(piece, piece) == ([], [(9, 20, 1.5)])
     assert records_of(TopicPiece(20, 1, 0, 2, b"")) == ([], [])
@@ -685,6 +689,7 @@ def test_what_was_skipped_is_lacking_until_it_comes(numbers, asked):
         (128, Qos.URGENT, 0.26, 328 - 256),
         (31, Qos.BULK, 0.1, 231),
         (32, Qos.BULK, 0.1, 232 - 256),
+        (32, Qos.BULK, 0.25, 232 - 256),
         (32, Qos.BULK, 0.26, 232),
         (90, Qos.LATENCY, 0.1, 290 - 256),
     ],
@@ -696,3 +701,164 @@ def test_a_relay_may_send_a_class_late_and_others_ahead(ahead, qos, at, number):
         made.heard(before, before, 0.0, forwarded=of_class)
     made.heard((200 + ahead) & 0xFF, 3, at, forwarded=qos)
     assert made.number == number
+
+
+def test_a_track_that_has_heard_nothing():
+    made = SequenceTrack()
+    assert (made.newest, made.number, made.lost, made.restarts) == (-1, -1, 0, 0)
+    assert not made.is_numbered
+    made.restart(5, 1)
+    assert (made.newest, made.lost, made.restarts) == (5, 0, 1)
+
+
+@pytest.mark.parametrize(("newest", "is_new"), [(128, False), (129, True)])
+def test_a_copy_is_known_among_the_last_128(newest, is_new):
+    made = SequenceTrack()
+    for number in range(newest + 1):
+        assert made.heard(number, number, 0.5)
+    assert made.heard(0, 0, 0.5) == is_new
+    assert made.newest == (256 if is_new else newest)
+    assert not made.heard(1, 1, 0.5, is_sealed=True), "T tells it from all others"
+    assert not made.heard(2, 2, 0.5, forwarded=Qos.BULK)
+
+
+def test_more_than_128_are_known_for_a_second():
+    for at, known in ((1.0, (0, 1, 199)), (1.25, (1, 199)), (1.5, (1, 199)), (1.75, (199,))):
+        for number in (0, 1, 199):
+            made = SequenceTrack()
+            for each in range(200):
+                made.heard(each, each, 0.5 if each else 0.0)
+            is_known = not made.heard(number, number, at, is_sealed=True)
+            assert is_known == (number in known), (at, number)
+
+
+def test_what_came_before_a_new_clock_is_not_looked_at():
+    made = SequenceTrack()
+    for number in range(200):
+        made.heard(number, number, 100.0)
+    made.begin_anew()
+    for number in range(200, 450):
+        assert made.heard(number & 0xFF, number, 1.0 + number / 100)
+    assert made.lost == 0
+
+
+@pytest.mark.parametrize(
+    ("told", "later_s", "newest"),
+    [
+        (100 + 256, 0.0, 356),
+        (100 + 257, 0.0, 101),
+        (100 + 256 + 20_000, 1.0, 20_356),
+        (100 + 257 + 20_000, 1.0, 101),
+        (99, 1.0, 100),
+    ],
+)
+def test_a_told_number_is_believed_as_far_as_a_source_can_count(told, later_s, newest):
+    made = SequenceTrack()
+    for number in (98, 100):
+        made.heard(number, number, 4.0, number)
+    assert made.heard(told & 0xFF if newest != 101 else 101, 7, 4.0 + later_s, told)
+    assert (made.newest, made.fills) == (newest, told == 99)
+
+
+COMMAND = TopicPolicy(deadman_s=1.0, from_=[9, 8])
+
+
+def ended(*messages):
+    """The events that follow from messages of robot 9, or of others."""
+    topics, acceptance = heard_topics(), accepting()
+    acceptance.set_policy(0, COMMAND)
+    ledger, events = RxLedger(topics), []
+    completion = Completion(topics, acceptance, ledger, Neighbors(2))
+    for each in messages:
+        completion.take(each, 7.0, events)
+    return completion, ledger, events
+
+
+def command(origin_at, src=9, number=0, asks=False, **more):
+    made = whole(src, number)._replace(origin=Origin(origin_at, 5.0, asks), stamped=(number, 3))
+    return made._replace(**more)
+
+
+def test_a_command_that_comes_after_a_newer_one_is_dropped():
+    completion, ledger, events = ended(
+        command(5.0), command(4.5), command(4.9995), command(None), command(4.5, src=8),
+        command(1.0, number=1), command(0.5, number=1), command(5.5), command(5.25),
+    )  # fmt: skip
+    assert [each.origin_at for each in events] == [5.0, 4.9995, None, 4.5, 1.0, 0.5, 5.5]
+    assert ledger.tally(9, 0).dropped == {"rx_outdated": 2}
+    assert [each.number for each in events if (each.src, each.topic_id) == (9, 0)] == [1, 2, 3, 4]
+    completion.forget(8, 7.0, events)
+    completion.take(command(2.0, src=8), 7.0, events)
+    completion.take(command(2.0), 7.0, events)
+    assert [each.origin_at for each in events[7:]] == [2.0]
+    completion.begin_anew()
+    completion.take(command(2.0), 7.0, events)
+    assert len(events) == 9
+
+
+def test_each_message_ends_under_one_name_and_who_asks_is_told():
+    for message_, reason in (
+        (command(6.0, asks=True), "delivered"),
+        (command(6.0, asks=True, number=3), "rx_unknown_topic"),
+        (command(6.0, asks=True, src=7), "rx_denied"),
+        (command(6.0, asks=True, is_proven=False), "rx_unproven"),
+        (command(6.0, asks=True, payload=b""), "rx_bad_cdr"),
+        (command(None, asks=True), "delivered"),
+    ):
+        _, ledger, events = ended(message_)
+        src, number, origin_at = message_.src, message_.number, message_.origin.at
+        age_s = None if origin_at is None else 1.0
+        assert events[0] == (src, number, 3, reason, age_s, 7.0)
+        assert len(events) == 1 + (reason == "delivered")
+        dropped = {} if reason == "delivered" else {reason: 1}
+        assert ledger.tally(src, number).dropped == dropped
+    _, _, (only,) = ended(command(6.0))
+    assert only[:8] == (9, 0, bytes(100), 1, 0, 6.0, 0.0, 1)
+
+
+def test_messages_of_a_number_wait_for_its_declaration():
+    topics = heard_topics()
+    acceptance = accepting()
+    ledger, events = RxLedger(topics), []
+    completion = Completion(topics, acceptance, ledger, Neighbors(2))
+    for number in (20, 21):
+        completion.take(command(6.0, number=number), 7.0, events)
+    (piece,) = pieces(20, ABOUT, 200)
+    assert topics.take(9, piece)
+    completion.declared(9, 20, 7.5, events)
+    assert [each.topic.name for each in events] == ["scan"]
+    completion.take(command(6.0, number=20), 7.5, events)
+    assert len(events) == 2
+    completion.expire(7.9, events)
+    assert ledger.tally(9, 21).dropped == {}
+    completion.expire(8.0, events)
+    assert ledger.tally(9, 21).dropped == {"rx_unknown_topic": 1}
+    completion.take(command(6.0, number=22, asks=True), 7.5, events)
+    completion.forget(9, 8.0, events)
+    assert events[2:] == [(9, 22, 3, "rx_unknown_topic", 2.0, 8.0)]
+    (other,) = pieces(23, ABOUT._replace(name="odom"), 200)
+    assert topics.take(9, other)
+    completion.take(command(6.0, number=23), 8.0, events)
+    assert ledger.tally(9, 23).dropped == {"rx_other_type": 1}
+    completion.drop(9, 20, "rx_part_lost")
+    assert ledger.tally(9, 20).dropped == {"rx_part_lost": 1}
+
+
+def heard_pdu(link, number, at, *records, age_us=None):
+    """A PDU of robot 1 with a message, and its age if that is given."""
+    builder = PduBuilder(96)
+    builder.add(0, number & 0xFF, 0, 1, bytes((0, 1, 0, 0)) + number.to_bytes(2, "big"))
+    for record in records:
+        assert builder.add_record(build_records([record]))
+    if age_us is not None:
+        assert builder.add_stamp(0, number & 0xFF, age_us)
+    octets = builder.build(0, 1, 255, number & 0xFF, 1)
+    return [link.delivered(each, at) for each in link.hear(octets, at, None, at, at + 0.125)]
+
+
+def test_the_age_of_a_late_pdu_grows_by_all_the_time_for_which_it_may_have_been_sent_before():
+    link = make_link(2, pdu_size=96)
+    heard_pdu(link, 200, 100.0, Beacon(1, 0, 200))
+    assert heard_pdu(link, 202, 100.5, age_us=1000) == [pytest.approx(0.001)]
+    assert heard_pdu(link, 201, 101.5, age_us=1000) == [pytest.approx(1.501)]
+    assert heard_pdu(link, 100, 101.5, Beacon(1, 1, 100), age_us=1000) == [pytest.approx(10.001)]
