@@ -96,6 +96,11 @@ def mode(path):
     return stat.S_IMODE(path.stat().st_mode)
 
 
+def is_live(path):
+    with socket.socket(socket.AF_UNIX) as probe:
+        return probe.connect_ex(os.fspath(path)) == 0
+
+
 def test_a_socket_is_bound_again_as_it_was(tmp_path, context):
     before = os.umask(0o022)
     try:
@@ -103,14 +108,16 @@ def test_a_socket_is_bound_again_as_it_was(tmp_path, context):
         bound = directory.bind(context, zmq.PULL, "in.sock", {zmq.RCVHWM: 7})
         assert bound.rcvhwm == 7
         directory.unbind(bound, "in.sock")
-        wait_for(lambda: not (tmp_path / "in.sock").exists())
+        wait_for(lambda: not is_live(tmp_path / "in.sock"))
         directory.bind_again(bound, "in.sock")
+        assert is_live(tmp_path / "in.sock")
         assert mode(tmp_path / "in.sock") & 0o007 == 0
         with pytest.raises(BusError, match=r"nowhere/in\.sock cannot be bound"):
             directory.bind_again(bound, "nowhere/in.sock")
         with pytest.raises(BusError, match=r"nowhere/x\.sock cannot be bound"):
             directory.bind(context, zmq.PULL, "nowhere/x.sock", {})
         assert os.umask(0o022) == 0o022, "files of others are made as before"
+        bound.close()
         directory.close()
     finally:
         os.umask(before)
