@@ -122,6 +122,7 @@ def memory(remembered=None, keys=(KEY,)):
 
 def test_the_floor_moves_ahead_of_the_numbers():
     kept, _, numbers, _ = memory()
+    assert kept.at_stop().floors == {KEY.fingerprint: 0}
     numbers.clock(0.0)
     wanted = kept.wanted(0.0)
     assert wanted == Remembered({KEY.fingerprint: 1920}, {KEY.fingerprint: {}}, KEY.fingerprint)
