@@ -327,6 +327,17 @@ def test_the_robot_that_got_least_comes_first():
     assert list(answers.wanted) == [(1, 17)]
 
 
+def test_what_nobody_asked_for_comes_as_for_one_that_got_nothing():
+    answers = make(twice=[Qos.DEFAULT])
+    send(answers, 9, 10, 12)
+    send(answers, 11, message=outgoing(expires_at=0.05))
+    ask(answers, 10, asker=2)
+    repeat(answers, most=1)
+    ask(answers, 9, asker=2)
+    ask(answers, 12, asker=3)
+    assert [each.number for each in repeat(answers).kept] == [11, 12, 9]
+
+
 def test_what_was_repeated_for_a_robot_fades():
     answers = make()
     send(answers, *range(10, 20))

@@ -862,3 +862,24 @@ def test_the_age_of_a_late_pdu_grows_by_all_the_time_for_which_it_may_have_been_
     assert heard_pdu(link, 202, 100.5, age_us=1000) == [pytest.approx(0.001)]
     assert heard_pdu(link, 201, 101.5, age_us=1000) == [pytest.approx(1.501)]
     assert heard_pdu(link, 100, 101.5, Beacon(1, 1, 100), age_us=1000) == [pytest.approx(10.001)]
+
+
+@pytest.mark.parametrize(("more", "is_believed"), [(0, True), (1, False)])
+def test_how_far_a_source_can_count_is_measured_from_the_last_told_number(more, is_believed):
+    made = SequenceTrack()
+    for number, at in ((100, 4.0), (102, 9.0), (101, 9.5)):
+        made.heard(number, number, at, number)
+    told = 102 + 256 + 20_000 + more
+    made.heard(told & 0xFF, 7, 10.0, told)
+    assert (made.newest == told) == is_believed
+
+
+def test_the_first_told_number_renumbers_what_was_heard_before():
+    made = SequenceTrack()
+    for seq in (10, 12):
+        made.heard(seq, seq, 1.0, forwarded=Qos.BULK)
+    assert made.heard(13, 13, 1.0, 3 * 256 + 13)
+    assert (made.newest, made.number, made.lost, list(made.skipped)) == (781, 781, 1, [779])
+    assert made.heard(11, 11, 1.0)
+    assert (made.number, made.fills, made.lost) == (779, True, 0)
+    assert not made.heard(12, 12, 1.0)
