@@ -5,8 +5,8 @@ from random import Random
 
 import pytest
 
+from sdrlinkd.link import Qos
 from sdrlinkd.link.packing import TopicEntryIds
-from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outgoing, TxTally
 from sdrlinkd.link.repeat import Answers, RepeatGroup, RepeatParams
 from sdrlinkd.link.repeat.testing import KeptPdus

@@ -4,7 +4,7 @@ from math import inf
 
 import pytest
 
-from sdrlinkd.link.qos import CLASSES, Qos
+from sdrlinkd.link import Qos
 from sdrlinkd.link.receive import PduPlaced
 from sdrlinkd.link.receive.testing import PduRead
 from sdrlinkd.link.repeat import Asking
@@ -14,7 +14,7 @@ from sdrlinkd.wire import PARTS, Bare, ControlEntries, Entry, Need, Parity, Pdu,
 
 NOTHING = RepeatReport(pdus=0, airtime_s=0.0, asked_of_us=0, unknown=0, expired=0, refused=0)
 MESSAGE = Entry(0, 1, 0, 1, b"data")
-Q_OF = {qos: q for q, qos in CLASSES.items()}
+Q_OF = {Qos.DEFAULT: 0, Qos.LATENCY: 1, Qos.BULK: 2, Qos.URGENT: 3}
 CONTROL = Entry(15, 0, 0, 1, b"")
 
 

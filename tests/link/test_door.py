@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from sdrlinkd.errors import PduError
-from sdrlinkd.link import TopicPolicy
-from sdrlinkd.link.params import LinkParams
+from sdrlinkd.link import LinkParams, TopicPolicy
 from sdrlinkd.link.queue import Inflated
 from sdrlinkd.link.receive import Neighbors, RecordHeard
 from sdrlinkd.link.receive.testing import (

@@ -562,6 +562,24 @@ def test_large_messages_are_parted_evenly_with_the_parity_of_their_class():
         assert made.tally(0).dropped == {"tx_too_big": 1}
 
 
+@pytest.mark.parametrize(
+    ("size", "max_bytes", "is_sealed", "is_compressed"),
+    [
+        (65_536, 0, False, True), (65_537, 0, False, False), (65_537, 0, True, True),
+        (65_537, 70_000, False, True),
+    ],
+)  # fmt: skip
+def test_what_receivers_would_not_expand_is_sent_as_it_is(
+    size, max_bytes, is_sealed, is_compressed
+):
+    outbox = Outbox(PLENTY)
+    made = intake(outbox=outbox, is_sealed=is_sealed)
+    made.set_policy(0, TopicPolicy(compress="zstd", max_bytes=max_bytes))
+    head = next_of(made, outbox, 0, bytes(size), 0.0)
+    assert head.is_compressed == is_compressed
+    assert (len(head.payload) < 1000) == is_compressed
+
+
 def test_latched_messages_are_queued_again_while_they_live():
     outbox = Outbox(PLENTY)
     made = intake(outbox=outbox)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.link.qos import Qos
+from sdrlinkd.link import Qos
 from sdrlinkd.link.queue import Inflated, TopicPolicy
 from sdrlinkd.link.receive import (
     Ages,

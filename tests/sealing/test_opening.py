@@ -40,7 +40,7 @@ def pdu(seq, *records, src=1, dst=255):
     builder.add(*Entry(0, 77, 0, 1, b"abcd"))
     for record in records:
         assert builder.add_record(build_records([record]))
-    return builder.build(0, src, dst, seq, 1)
+    return builder.build(0, src, dst, seq, 2)
 
 
 def opened(one, two, at, seq, *records, later_s=0.01):

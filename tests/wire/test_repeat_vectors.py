@@ -225,6 +225,8 @@ def test_a_bitmap_reaches_as_far_as_it_may_and_no_farther(numbers, most):
 
 def test_number_0_is_asked_for():
     assert needs(3, [0]) == [Need(3, 0, b"\x80")]
+    for most, reach in ((1, 8), (15, 120), (16, 128), (17, 128)):
+        assert [len(needs(3, [0, off], most)) for off in (reach - 1, reach)] == [1, 2]
     assert needs(3, [0, 9, 300]) == [Need(3, 0, b"\x80\x40"), Need(3, 300, b"\x80")]
 
 
