@@ -95,6 +95,12 @@ def test_what_a_description_may_say(about, expected):
         assert parse_description(joined(told), told[0].check) == (expected or about)
 
 
+def test_a_depth_is_told_up_to_255():
+    for depth in (254, 255, 256, 300):
+        (told,) = pieces(16, SHORT._replace(depth=depth), 200)
+        assert parse_description(told.data, told.check).depth == min(depth, 255)
+
+
 def test_the_depth_of_what_is_not_latched_does_not_count_and_pieces_must_fit_together():
     (told,) = pieces(16, SHORT, 200)
     for flags, depth, is_best_effort, kept in (
