@@ -17,7 +17,6 @@ CONTACT_OVERHEAD = 2 + CONTACT_NUMBER_SIZE
 _KEY = struct.Struct(f">B{KEY_PREFIX_SIZE}s")
 KEY_SIZE = _KEY.size
 _AUTH = 0x04
-_MAX_VALUE_SIZE = 255
 
 
 class Met(NamedTuple):
@@ -48,14 +47,10 @@ class KeyTold(NamedTuple):
 
 
 def build_contact(contact: Contact) -> bytes:
-    """The value of a CONTACT record. Raises ValueError if a field is out of range."""
-    try:
-        value = contact.number + b"".join(_MET.pack(*each) for each in contact.met)
-    except struct.error as error:
-        raise ValueError(f"{contact} does not fit its record: {error}") from None
-    if len(contact.number) != CONTACT_NUMBER_SIZE or len(value) > _MAX_VALUE_SIZE:
+    """The value of a CONTACT record. Raises ValueError or struct.error if a field does not fit."""
+    if len(contact.number) != CONTACT_NUMBER_SIZE:
         raise ValueError(f"{contact} does not fit its record")
-    return value
+    return contact.number + b"".join(_MET.pack(*each) for each in contact.met)
 
 
 def parse_contact(value: bytes) -> Contact:

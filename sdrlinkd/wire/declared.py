@@ -119,9 +119,9 @@ class Description(NamedTuple):
 
 
 def build_topic(piece: TopicPiece) -> bytes:
-    """The value of a TOPIC record. Raises ValueError if a field is out of range."""
+    """The value of a TOPIC record. Raises ValueError or struct.error if a field is out of range."""
     number, check, at, n, data = piece
-    if not (0 <= at <= 0xF and 0 <= n <= 0xF):
+    if n > 0xF:
         raise ValueError(f"piece {at} of {n} of topic {number} does not fit its record")
     return _PIECE.pack(number, check, at << 4 | n) + data
 

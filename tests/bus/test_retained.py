@@ -49,6 +49,14 @@ def test_the_bound_itself_may_be_kept():
         assert numbers(retention) == [1, 2, 3][max(0, number - 2) : number]
 
 
+def test_what_a_newer_message_replaces_leaves_its_room():
+    retention = Retention(most_bytes=3 * (8 + 512))
+    retention.keep((2, 9), message("other", 100), 1)
+    for number in range(9):
+        retention.keep((2, 0), message("map", number), 2)
+    assert numbers(retention) == [100, 7, 8]
+
+
 def test_what_is_forgotten_leaves_its_room():
     retention = Retention(most_bytes=4000)
     for first in range(0, 60, 6):

@@ -9,6 +9,7 @@ import zmq
 
 from sdrlinkd.bus import RuntimeDirectory, is_foreign
 from sdrlinkd.errors import BusError
+from tests.waiting import wait_for
 
 
 @pytest.fixture
@@ -89,3 +90,52 @@ def test_a_path_that_is_too_long_or_no_directory_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(BusError, match="is unusable"):
         RuntimeDirectory(tmp_path / "file")
+
+
+def mode(path):
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+def is_live(path):
+    with socket.socket(socket.AF_UNIX) as probe:
+        return probe.connect_ex(os.fspath(path)) == 0
+
+
+def test_a_socket_is_bound_again_as_it_was(tmp_path, context):
+    before = os.umask(0o022)
+    try:
+        directory = RuntimeDirectory(tmp_path)
+        bound = directory.bind(context, zmq.PULL, "in.sock", {zmq.RCVHWM: 7})
+        assert bound.rcvhwm == 7
+        directory.unbind(bound, "in.sock")
+        wait_for(lambda: not is_live(tmp_path / "in.sock"))
+        directory.bind_again(bound, "in.sock")
+        assert is_live(tmp_path / "in.sock")
+        assert mode(tmp_path / "in.sock") & 0o007 == 0
+        with pytest.raises(BusError, match=r"nowhere/in\.sock cannot be bound"):
+            directory.bind_again(bound, "nowhere/in.sock")
+        with pytest.raises(BusError, match=r"nowhere/x\.sock cannot be bound"):
+            directory.bind(context, zmq.PULL, "nowhere/x.sock", {})
+        assert os.umask(0o022) == 0o022, "files of others are made as before"
+        bound.close()
+        directory.close()
+    finally:
+        os.umask(before)
+
+
+def test_the_lock_has_the_pid_as_long_as_the_daemon_runs(tmp_path):
+    (tmp_path / "lock").write_text("999999999 of a daemon that was killed")
+    directory = RuntimeDirectory(tmp_path)
+    assert (tmp_path / "lock").read_text() == f"{os.getpid()}\n"
+    directory.close()
+    assert (tmp_path / "lock").read_text() == ""
+
+
+def test_a_path_may_have_95_octets_and_a_link_of_ours_is_followed(tmp_path):
+    room = 95 - len(os.fsencode(tmp_path)) - 1
+    (tmp_path / "here").symlink_to(tmp_path)
+    if room > 5:
+        RuntimeDirectory(tmp_path / ("x" * room)).close()
+        with pytest.raises(BusError, match="has 96 bytes"):
+            RuntimeDirectory(tmp_path / ("x" * (room + 1)))
+    RuntimeDirectory(tmp_path / "here").close()

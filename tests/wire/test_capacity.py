@@ -7,14 +7,18 @@ from hypothesis import strategies as st
 from sdrlinkd.wire import (
     MAX_PDU_SIZE,
     MIN_PDU_SIZE,
+    PARTS,
     Entry,
     Pdu,
+    PduBuilder,
     build,
+    build_full,
     entry_budget,
     equal_payload,
     fragment_count,
     max_message_size,
     pad_length,
+    parse,
 )
 from tests.laws import law
 
@@ -102,3 +106,56 @@ def test_max_message_size(pdu_size, size):
 )
 def test_fragment_count(size, k, count):
     assert fragment_count(size, k) == count
+
+
+steps = st.lists(st.integers(0, 30) | st.binary(min_size=2, max_size=30), max_size=18)
+"""Entries of a number of octets, and records."""
+
+
+def filled(pdu_size, steps):
+    """A builder with as many of the entries and records as fit."""
+    builder = PduBuilder(pdu_size)
+    for step in steps:
+        if isinstance(step, bytes):
+            builder.add_record(step)
+        elif step <= builder.room:
+            builder.add(3, 1, 0, 1, bytes(step))
+    return builder
+
+
+def fits(builder, size, with_stamp):
+    try:
+        builder.add(3, 1, 0, 1, bytes(size))
+    except ValueError:
+        return False
+    return not with_stamp or builder.add_stamp(3, 1, 5)
+
+
+@law(150)
+@given(st.sampled_from((32, 48, 110, 220, 301)), steps)
+def test_a_builder_knows_its_room(pdu_size, steps):
+    """The largest payload that fits, and that fits with its STAMP."""
+    builder = filled(pdu_size, steps)
+    for with_stamp, room in ((False, builder.room), (True, builder.room_beside_stamp)):
+        for size in range(max(0, room - 1), max(0, room) + 2):
+            assert fits(filled(pdu_size, steps), size, with_stamp) == (size <= room), size
+    assert builder.is_empty == (builder.room == pdu_size - 13)
+    if not builder.is_empty:
+        entries = parse(builder.build(0, 1, 2, 3, 4, 99), pdu_size).entries
+        records = [each for each in entries if each.topic_id == 15]
+        assert [each[1:4] for each in records] in ([], [(99, 0, 1)])
+        assert records == entries[len(entries) - len(records) :]
+
+
+@pytest.mark.parametrize("topic_id", [0, 15, 16, 255, PARTS])
+def test_a_pdu_with_one_entry_is_built_at_once(topic_id):
+    entry = (topic_id, 3, 4, 5, b"abcdef")
+    builder = PduBuilder(13 + 6 + (topic_id > 15))
+    builder.add(*entry)
+    octets = builder.build(8, 1, 2, 6, 7)
+    assert build_full(8, 1, 2, 6, 7, *entry) == octets
+    (told,) = parse(octets, len(octets)).entries
+    if topic_id > 15:
+        topic_id, ahead = 14, b"\0" if topic_id == PARTS else bytes([topic_id])
+        entry = (topic_id, 3, 4, 5, ahead + b"abcdef")
+    assert told == entry

@@ -38,6 +38,7 @@ from sdrlinkd.wire import (
     Wanted,
     build_records,
     parse_records,
+    tellable,
 )
 from tests.laws import law, trials
 from tests.wire.vectors import RECORDS
@@ -351,6 +352,19 @@ def test_any_bytes_are_records_or_refused():
         Contact(bytes(8), (Met(0, bytes(4), 1 << 31),)),
         Contact(bytes(8), (Met(0, bytes(4), 0),) * 28),
         KeyTold(4, False, bytes(4)),
+        KeyTold(-1, False, bytes(4)),
+        TopicPiece(256, 0, 0, 1, b""),
+        TopicPiece(16, 1 << 16, 0, 1, b""),
+        *(TopicPiece(16, 0, at, n, b"") for at, n in ((-1, 0), (16, 0), (0, -1), (0, 16))),
+        TopicPiece(16, 0, 0, 1, bytes(252)),
+        Want(0, -1, 0, 0, 0, 0),
+        Want(0, 0, -1, 0, 0, 0),
+        Want(0, 0, 0, 128, 0, 0),
+        Want(0, 0, 0, 0, 0, 256),
+        Flows(0, 0, (ReservedFlow(0, 0, -1, 0, 0, 0, 0),)),
+        Flows(0, 0, (ReservedFlow(0, 0, 0, -1, 0, 0, 0),)),
+        Wanted(256, b""),
+        Wanted(0, bytes(255)),
         KeyTold(0, False, bytes(3)),
     ],
     ids=str,
@@ -358,6 +372,22 @@ def test_any_bytes_are_records_or_refused():
 def test_field_out_of_range(record):
     with pytest.raises(ValueError):
         build_records([record])
+
+
+def test_the_largest_values_fit():
+    for record in (Wanted(0, bytes(254)), TopicPiece(16, 0, 0, 1, bytes(251))):
+        assert parse_records(build_records([record])) == [record]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_times_of_arrivals_are_told_in_tens_of_nanoseconds_if_they_fit(sign):
+    most = 10 * ((1 << 31) - 1)
+    for after_ns, told_ns in ((14, 10), (16, 20), (most, most)):
+        arrival = Arrival(1, 2, sign * after_ns)
+        assert tellable(arrival)
+        (clock,) = parse_records(build_records([Clock(1, 2, 3, 4, arrivals=(arrival,))]))
+        assert clock.arrivals == (Arrival(1, 2, sign * told_ns),)
+    assert not tellable(Arrival(1, 2, sign * (most + 1)))
 
 
 def refused(payload):

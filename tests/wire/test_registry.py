@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import RegistryError
-from sdrlinkd.wire import RegistryDigest, Topic, make_registry, parse_registry
+from sdrlinkd.wire import Registry, RegistryDigest, Topic, make_registry, parse_registry
 from tests.laws import law
 from tests.wire.vectors import TABLE_4
 
@@ -178,3 +178,33 @@ def test_digest_ignores_what_means_the_same():
     theirs = make_registry([(f"/{name}", kind.replace("/", "/msg/")) for name, kind in PAIRS])
     assert theirs.digest() == ours
     assert ours.differing_ids(theirs.digest()) == []
+
+
+def test_a_shortened_digest_tells_that_they_differ_and_not_where():
+    ours, theirs = (make_registry(pairs).digest() for pairs in (PAIRS, PAIRS[1:]))
+    short = theirs.shortened()
+    assert (short.overall, short.per_topic) == (theirs.overall, b"")
+    assert ours.differing_ids(short) == short.differing_ids(ours) == []
+    assert RegistryDigest.from_bytes(ours.overall + ours.per_topic) == ours
+
+
+def test_the_dictionaries_of_topics_are_in_the_digest():
+    registry = make_registry(PAIRS)
+    ours, theirs = registry.digest({1: 7, 3: 9}), registry.digest({1: 7, 3: 10})
+    assert ours.differing_ids(registry.digest()) == [1, 3]
+    assert ours.differing_ids(theirs) == [3]
+    assert registry.digest({}) == registry.digest()
+
+
+@pytest.mark.parametrize(("count", "leaves"), [(13, True), (14, True), (15, False), (16, False)])
+def test_up_to_fourteen_topics_leave_a_topic_id_for_declared_ones(count, leaves):
+    assert parse_registry(numbered(count)).leaves_numbers is leaves
+
+
+def test_suggestions_are_for_names_that_look_alike():
+    registry = make_registry([("odom", "a/B"), ("camera/image", "a/B")])
+    assert registry.suggest("/camera/imag").endswith(
+        "odom, camera/image; did you mean camera/image?"
+    )
+    assert registry.suggest("zzz") == "the registry has odom, camera/image"
+    assert Registry(()).suggest("x") == "the registry has no topics"

@@ -15,6 +15,8 @@ from sdrlinkd.wire import (
     Repeat,
     build,
     build_records,
+    heard_number,
+    is_newer_number,
     nearest_number,
     needs,
     parse,
@@ -204,6 +206,45 @@ def test_needs_ask_for_exactly_these_numbers(node, numbers):
 def test_needs_of_numbers_far_apart(node, numbers):
     asked = [number for need in needs(node, numbers) for number in need.numbers()]
     assert sorted(asked) == numbers
+
+
+@law(60)
+@given(missing_numbers(), st.integers(1, 20))
+def test_a_bitmap_reaches_as_far_as_it_may_and_no_farther(numbers, most):
+    found, reach = needs(3, numbers, most), 8 * min(most, MAX_BITMAP)
+    firsts = [need.number for need in found]
+    expected = []
+    for number in numbers:
+        if not expected or number - expected[-1] >= reach:
+            expected.append(number)
+    assert firsts == [number % NUMBERS for number in expected]
+    assert all(len(need.bitmap) <= min(most, MAX_BITMAP) for need in found)
+    assert all(need.bitmap[0] >= 0x80 for need in found)
+    assert all(need.bitmap[-1] for need in found), "no octet too much"
+
+
+def test_number_0_is_asked_for():
+    assert needs(3, [0]) == [Need(3, 0, b"\x80")]
+    for most, reach in ((1, 8), (15, 120), (16, 128), (17, 128)):
+        assert [len(needs(3, [0, off], most)) for off in (reach - 1, reach)] == [1, 2]
+    assert needs(3, [0, 9, 300]) == [Need(3, 0, b"\x80\x40"), Need(3, 300, b"\x80")]
+
+
+@pytest.mark.parametrize(
+    ("number", "last", "is_newer"),
+    [
+        (1, 0, True), (0, 0, False), (0, 1, False), (0x7FFF, 0, True), (0x8000, 0, False),
+        (0, 0xFFFF, True), (0xFFFF, 0, False),
+    ],
+)  # fmt: skip
+def test_numbers_of_flows_wrap_around(number, last, is_newer):
+    assert is_newer_number(number, last) == is_newer
+
+
+@law(60)
+@given(st.integers(0, 3 * NUMBERS), st.integers(-(1 << 31), (1 << 31) - 1))
+def test_a_told_number_is_the_nearest_in_the_count(known, step):
+    assert heard_number(known, (known + step) % NUMBERS) == known + step
 
 
 @law(60)

@@ -1,0 +1,9 @@
+"""What tests look at, piece by piece; not part of the interface."""
+
+from sdrlinkd.link.queue.admission import Admission
+from sdrlinkd.link.queue.parting import Parting
+
+__all__ = [
+    "Admission",
+    "Parting",
+]
