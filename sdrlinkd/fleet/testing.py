@@ -30,6 +30,7 @@ from sdrlinkd.fleet.ros.names import (
 )
 from sdrlinkd.fleet.ros.side import MOST_TAKEN
 from sdrlinkd.fleet.ros.topics import ENCODING, MOST_HASHES, Topics
+from sdrlinkd.fleet.ros.topics import MOST_TOPICS as MOST_PUT
 from sdrlinkd.fleet.samples import Putter, Question, Sample
 from sdrlinkd.fleet.session import AT_ONCE, MOST_QUERIES, Session
 from sdrlinkd.fleet.session import MOST_WAITING as MOST_SAMPLES
@@ -46,6 +47,7 @@ __all__ = [
     "MOST_KNOWN",
     "MOST_MESSAGES",
     "MOST_PROXIES",
+    "MOST_PUT",
     "MOST_QUERIES",
     "MOST_REMEMBERED",
     "MOST_RESULTS",

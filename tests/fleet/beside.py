@@ -21,7 +21,7 @@ from tests.bus.programs import REGISTRY, Ingress
 
 CDR = b"\0\1\0\0data"
 OWN, ROBOT = 7, 2
-PATIENCE_S = 30.0
+PATIENCE_S = 10.0
 """Time in s after which a wait was in vain."""
 
 
