@@ -88,9 +88,10 @@ class Daemon:
         told = {"lost_pdus": 0, "origin_at": None, "heard_at": 0.0, "hops_left": 0, "snr_db": None}
         told |= {"name": MessageName(1, number % 256, number, 0, is_numbered=True)}
         payload = more.pop("payload", CDR + bytes((number,)))
-        heard = HeardTopic(200, topic, kind)
         # A number on the air for each name.
-        told |= {"topic_id": 1 + sum(topic.encode()) % 200, "number": number, "topic": heard}
+        topic_id = 1 + sum(topic.encode()) % 200
+        heard = HeardTopic(topic_id, topic, kind)
+        told |= {"topic_id": topic_id, "number": number, "topic": heard}
         self._bus.publish(Delivered(src=robot, payload=payload, **{**told, **more}), age_s, 77)
 
     def stop_message(self, topic="odom", robot=ROBOT):
