@@ -1,7 +1,8 @@
-"""What is beside a gateway's parts in this process: a daemon's bus, Zenoh, and the notes of both."""
+"""What is beside a gateway's parts in this process: a daemon's bus, Zenoh, and notes of both."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
+from typing import TypeVar
 
 import zenoh
 import zmq
@@ -19,6 +20,7 @@ from sdrlinkd.wire import Topic
 from tests import reported
 from tests.bus.programs import REGISTRY, Ingress
 
+T = TypeVar("T")
 CDR = b"\0\1\0\0data"
 OWN, ROBOT = 7, 2
 PATIENCE_S = 10.0
@@ -28,8 +30,16 @@ PATIENCE_S = 10.0
 async def until(is_so: Callable[[], bool]) -> None:
     """Wait until `is_so()`, which no event tells."""
     async with asyncio.timeout(PATIENCE_S):
-        while not is_so():
+        while not is_so():  # noqa: ASYNC110 (it has none)
             await asyncio.sleep(0.005)
+
+
+async def until_found(ask: Callable[[], Awaitable[T]], is_so: Callable[[T], bool]) -> T:
+    """What `ask` finds, once that is so."""
+    async with asyncio.timeout(PATIENCE_S):
+        while not is_so(found := await ask()):  # noqa: ASYNC110
+            await asyncio.sleep(0.02)
+    return found
 
 
 class Daemon:

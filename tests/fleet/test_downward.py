@@ -141,7 +141,8 @@ async def test_the_daemon_gets_each_command_and_its_receipts_become_fates(daemon
         (first, second) = daemon.taken
         assert first[:2] == ("/robot_7/cmd_vel", CDR)
         assert first[2] == Overrides(dst=ROBOT, receipt=first[2].receipt)
-        assert second[2] == Overrides(Qos.BULK, dst=ROBOT, lifespan_s=2.0, receipt=second[2].receipt)
+        wishes = second[2]
+        assert wishes == Overrides(Qos.BULK, dst=ROBOT, lifespan_s=2.0, receipt=wishes.receipt)
         # A command's age counts from when it came to the gateway.
         for published_ns in (first[3], second[3]):
             assert 0.5 <= (time.time_ns() - published_ns) / 1e9 < 30

@@ -76,16 +76,15 @@ def test_names_of_robots_topics_are_read_back():
     ]  # fmt: skip
     kind = dds_type(ODOM)
     assert read_data_key(4, f"4/robot_2/odom/{kind}/{HASH}") == ("/robot_2/odom", kind)
-    for key in (f"4/{kind}/{HASH}", f"4//{kind}/{HASH}", f"4/odom/{kind}/", f"5/odom/{kind}/{HASH}"):
+    for key in ("4/K/H", "4//K/H", "4/odom/K/", "5/odom/K/H"):
         assert read_data_key(4, key) is None, key
 
 
 @pytest.mark.parametrize("at", range(13))
 def test_an_endpoint_with_one_part_wrong_or_missing_is_none(at):
-    token = Node(DOMAIN, "ab12", "desk").endpoint(1, Role.SERVICE, "/set", "a::srv::dds_::B_", HASH, Qos())  # fmt: skip
-    assert read_endpoint(token) == (
-        "ab12", "desk", Role.SERVICE, "/set", "a::srv::dds_::B_", HASH,
-    )  # fmt: skip
+    about = Role.SERVICE, "/set", "a::srv::dds_::B_", HASH
+    token = Node(DOMAIN, "ab12", "desk").endpoint(1, *about, Qos())
+    assert read_endpoint(token) == ("ab12", "desk", *about)
     chunks = token.split("/")
     assert read_endpoint("/".join(chunks[:at] + chunks[at + 1 :])) is None
     is_read = at in (5, 9, 10, 11)
@@ -182,7 +181,8 @@ class Putting:
     @property
     def opened(self):
         """(name, hash, QoS) of the publishers in the graph."""
-        return [(each[9], each[11], each[12]) for each in (t.split("/") for t in self.notes.tokens[1:])]
+        chunks = [token.split("/") for token in self.notes.tokens[1:]]
+        return [(each[9], each[11], each[12]) for each in chunks]
 
 
 @pytest.fixture
@@ -216,7 +216,8 @@ def test_messages_of_a_topic_are_numbered_from_one_publisher(putting):
 def test_what_a_robot_says_anew_of_a_topic_opens_it_anew(putting):
     putting.put()
     putting.put(about=About(latched=1))
-    assert [(qos, kept) for (*_, qos), (*_, kept) in zip(putting.opened, putting.notes.publishers, strict=True)] == [("::,10:,:,:,,".replace("::,10", ":1:,1"), 1)]  # fmt: skip
+    assert [qos for *_, qos in putting.opened] == [":1:,1:,:,:,,"]
+    assert [kept for *_, kept in putting.notes.publishers] == [1]
     assert Attachment.parse(putting.notes.puts[-1][2]).number == 1
     putting.put(robot=3)
     putting.topics.close(ROBOT)
@@ -258,7 +259,8 @@ def test_the_hash_is_that_of_the_type_or_of_subscriptions_that_agree(
     putting, kind, says, wanted, put
 ):
     for number, hash_ in enumerate(wanted):
-        note(putting.notes, endpoint(Role.SUBSCRIPTION, "/robot_2/odom", kind, hash_, number=number))
+        wanted_one = endpoint(Role.SUBSCRIPTION, "/robot_2/odom", kind, hash_, number=number)
+        note(putting.notes, wanted_one)
     putting.put(kind=kind, about=About(hash=says))
     assert putting.keys == [key_of("/odom", kind, each) for each in put]
     is_known = put and put[0] == type_hash(ODOM)
@@ -313,7 +315,8 @@ class Calling:
 def test_the_services_of_robots_that_are_served_are_those_that_may_be_called(graph):
     calling = Calling(graph)
     calls = calling.calls
-    calls.offer(ROBOT, told([SET, *GO, Service("/get", "a/srv/Set", ""), Service("/se*", "a/srv/Set", "")]))  # fmt: skip
+    others = [Service(name, "a/srv/Set", "") for name in ("/get", "/se*")]
+    calls.offer(ROBOT, told([SET, *GO, *others]))
     assert calling.served == []
     calls.serve([ROBOT, 3])
     keys = [f"%robot_2{name}" for name in ("%set", *(f"%arm%go%_action%{each}" for each in
@@ -352,7 +355,8 @@ async def daemon(tmp_path):
     daemon = Daemon(
         tmp_path,
         f'[fleet]\nname = "mine"\nzenoh = "zenoh.json5"\nros_domain = {DOMAIN}\n'
-        'down = ["cmd_vel", "arm*", "set"]\n[topic.map]\ndurability = "transient_local"\ndepth = 3\n',
+        'down = ["cmd_vel", "arm*", "set"]\n'
+        '[topic.map]\ndurability = "transient_local"\ndepth = 3\n',
     )
     yield daemon
     daemon.stop()
@@ -369,6 +373,7 @@ async def calling(graph, daemon):
 
 async def requests(daemon, n):
     """The requests that the daemon has got, once there are `n` of them."""
+
     def found():
         packets = [(name, Packet.parse(cdr), wishes) for name, cdr, wishes, _ in daemon.taken]
         return [each for each in packets if each[1].kind == Kind.REQUEST]
@@ -537,11 +542,11 @@ async def test_a_message_of_a_topic_of_the_registry_is_put_at_once(side):
     assert side.keys == [key_of("/odom", ODOM, type_hash(ODOM))] * 3 + [
         key_of("/map", "nav_msgs/msg/OccupancyGrid", type_hash("nav_msgs/msg/OccupancyGrid"))
     ]
-    assert [(qos, kept) for _, qos, _, kept in side.notes.publishers] == [("latency", 0), ("bulk", 3)]
-    sent = [Attachment.parse(told).sent_ns for _, _, told, _ in side.notes.puts]
+    kept = [(qos, kept) for _, qos, _, kept in side.notes.publishers]
+    assert kept == [("latency", 0), ("bulk", 3)]
+    sent = [Attachment.parse(each[2]).sent_ns for each in side.notes.puts]
     assert sent[0] == 5
-    assert sent[1] == pytest.approx(before_ns - 1_000_000_000, abs=20e9)
-    assert sent[1] < before_ns - 900_000_000 or time.time_ns() - before_ns > 50_000_000
+    assert before_ns <= sent[1] + 1_000_000_000 <= time.time_ns()
     assert before_ns <= sent[2] <= time.time_ns()
 
 
@@ -588,13 +593,13 @@ async def test_a_node_sends_commands_to_a_robot(side):
     key = key_of("/cmd_vel", TEXT, HASH)
     take(Sample(key, CDR, right, "application/cdr"))
     assert took == [(FromRos(TopicKey(ROBOT, "cmd_vel"), Command(GID.hex(), 3, TEXT)), CDR)]
-    for other, told, encoding in (
+    for other, attachment, encoding in (
         (key, right, ENCODING), (key, b"junk", ""), (key, None, ""),
         (key.replace("robot_2", "robot_3"), right, ""), (key.replace("robot_2", "robo"), right, ""),
         (key.replace("::dds_", ""), right, ""), ("junk", right, ""),
         (key, Attachment(-1, 5, GID).build(), ""),
     ):  # fmt: skip
-        take(Sample(other, CDR, told, encoding))
+        take(Sample(other, CDR, attachment, encoding))
     assert len(took) == 1
     take(Sample(key, CDR, Attachment(0, 5, GID).build(), ""))
     assert len(took) == 2
@@ -680,7 +685,8 @@ async def test_topics_of_actions_appear_as_the_robots_action_has_them(side):
     side.ros.hear(ROBOT, "_sdrlink/status", message(b"junk"), leads=True)
     side.ros.hear(ROBOT, "odom", message(of_go), leads=True)
     assert side.keys == []
-    note(side.notes, endpoint(Role.SUBSCRIPTION, "/robot_2/arm/go/_action/feedback", "a/action/Go_FeedbackMessage"))  # fmt: skip
+    name, kind = "/robot_2/arm/go/_action/feedback", "a/action/Go_FeedbackMessage"
+    note(side.notes, endpoint(Role.SUBSCRIPTION, name, kind))
     before_ns = time.time_ns()
     side.ros.hear(ROBOT, "_sdrlink/feedback", message(of_go, 3_000_000), leads=True)
     side.ros.hear(ROBOT, "_sdrlink/status", message(of_go), leads=True)
@@ -691,8 +697,7 @@ async def test_topics_of_actions_appear_as_the_robots_action_has_them(side):
     ]
     assert [(payload, qos) for _, payload, _, qos in side.notes.puts] == [(b"inner", "latency")] * 2
     first, second = (Attachment.parse(each[2]).sent_ns for each in side.notes.puts)
-    assert -1e9 < first - (before_ns - 3_000_000_000) < 20e9
-    assert first <= second - 2_900_000_000 <= time.time_ns()
+    assert before_ns <= first + 3_000_000_000 <= second <= time.time_ns()
     assert [kept for *_, kept in side.notes.publishers] == [0, 1]
     qos = [each.rpartition("/")[2] for each in side.notes.tokens if "/MP/" in each]
     assert qos == ["2::,10:,:,:,,", ":1:,1:,:,:,,"]

@@ -66,11 +66,11 @@ class Upwards:
     @property
     def put(self):
         """(topic, number, age, whether again, class) of what was put."""
-        puts = [(key, payload, read_passed(told), qos) for key, payload, told, qos in self.session.puts]
-        return [
-            (KEYS.read_message(key).topic, payload[4], told.age, told.again, qos)
-            for key, payload, told, qos in puts
-        ]
+        found = []
+        for key, payload, attachment, qos in self.session.puts:
+            told = read_passed(attachment)
+            found.append((KEYS.read_message(key).topic, payload[4], told.age, told.again, qos))
+        return found
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,10 @@ class Upwards:
         ({"name": None, "is_stop": True}, {"stop": True}),
         ({"is_late": True, "age_us": None}, {"b": 9, "e": 1, "pn": 5, "again": True, "age": None}),
         (
-            {"series": 3, "snr_db": 2.5, "published_ns": 6, "published_error_us": 7, "hops_left": 1},
+            {
+                "series": 3, "snr_db": 2.5, "published_ns": 6, "published_error_us": 7,
+                "hops_left": 1,
+            },
             {"b": 9, "e": 1, "pn": 5, "sr": 3, "sn": 2.5, "tl": 6, "eb": 7, "h": 1},
         ),
     ],
