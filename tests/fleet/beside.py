@@ -154,6 +154,8 @@ class Network:
         self.far = await asyncio.to_thread(zenoh.open, config)
         for key in keys:
             self._kept.append(self.far.declare_subscriber(key, self.came.append))
+        # Its answer comes after the other session has taken the declarations.
+        await asyncio.to_thread(lambda: list(self.far.liveliness().get("any")))
 
     async def part(self):
         """The plain node leaves."""
