@@ -164,13 +164,15 @@ class Network:
             self.far = None
 
     async def ask(self, key, payload=None, attachment=None):
-        """The answers to a query of the plain node."""
+        """The answers to a query of the plain node, which does not wait until its time is over."""
 
         def asked():
-            found = self.far.get(key, payload=payload, attachment=attachment, timeout=10)
+            most_s = 2 * PATIENCE_S
+            found = self.far.get(key, payload=payload, attachment=attachment, timeout=most_s)
             return [each.ok for each in found if each.ok is not None]
 
-        return await asyncio.to_thread(asked)
+        async with asyncio.timeout(PATIENCE_S):
+            return await asyncio.to_thread(asked)
 
     def token(self, key):
         """Set up a token of the plain node; returns it."""

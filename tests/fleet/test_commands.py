@@ -109,6 +109,7 @@ def test_a_command_is_known_for_five_seconds_and_its_number_for_longer():
     assert isinstance(take(commands, now=15.0, leads=True, op="tablet"), Order)
     assert take(commands, now=15.0, leads=True) is Refusal.OUTDATED
     assert take(commands, n=2, now=15.0, leads=True) is Refusal.AGAIN
+    assert take(commands, n=2, now=99.0, leads=True) is Refusal.AGAIN, "however late"
     # What another one says of a forgotten command makes nobody send it.
     commands.told(2, fate("dropped"), 15.0)
     assert commands.due(99.0) == []

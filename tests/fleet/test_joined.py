@@ -38,14 +38,17 @@ DOMAIN = 42
 class Joined:
     """Gateway 7 between its daemon and a plain node of Zenoh."""
 
-    def __init__(self, folder, more):
+    def __init__(self, folder, more, *, is_read):
         self.network = Network()
         self.daemon = Daemon(
             folder,
             '[fleet]\nname = "mine"\nzenoh = "zenoh.json5"\n'
             f'listen = ["{self.network.endpoint}"]\n{more}',
         )
-        self.daemon.hears(ROBOT)
+        if is_read:
+            self.daemon.hears(ROBOT)
+        else:
+            self.daemon.snapshot = None
 
     async def join(self):
         await self.network.join(KEYS.all_messages, KEYS.routes, KEYS.all_sent)
@@ -107,8 +110,8 @@ def adds_up(report):
 
 
 @asynccontextmanager
-async def started(folder, more="", *, joins=True):
-    joined = Joined(folder, more)
+async def started(folder, more="", *, joins=True, is_read=True):
+    joined = Joined(folder, more, is_read=is_read)
     running = asyncio.ensure_future(run_gateway(joined.daemon.setup, folder))
     try:
         await joined.daemon.is_heard()
@@ -186,12 +189,13 @@ async def test_a_gateway_leaves_messages_to_the_leader_and_puts_what_that_misses
     tokens = await join.follow()
     assert (await join.report()).others == [OTHER]
     passed = Passed(OTHER, KIND, 1, 1, 1, 0)
-    daemon.bring(1)
     far.put(ODOM, CDR + b"\1", attachment=encode(passed))
+    assert (await join.report()).up_taken == 0
+    daemon.bring(1)
     await join.reports(lambda report: report.up["up_left"] == 1)
     daemon.bring(2)
     await join.reports(lambda report: report.up["up_put"] == 1)
-    assert [each.gw for each in join.told()] == [OTHER, OWN]
+    await until(lambda: [each.gw for each in join.told()] == [OTHER, OWN])
     # Claims of strangers and to robots elsewhere change nothing.
     far.put(KEYS.route(ROBOT), b"junk")
     join.claim(Claim(9, 99, 1.0), 99)
@@ -364,6 +368,14 @@ async def test_a_gateway_is_a_node_of_the_ros_graph(tmp_path):
         await join.follow()
         await until_found(is_served, lambda found: not found)
         kept.undeclare()
+
+
+async def test_a_daemon_whose_report_cannot_be_read_is_heard_all_the_same(tmp_path):
+    async with started(tmp_path, is_read=False) as join:
+        assert not (await join.report()).has_daemon
+        join.daemon.bring(1)
+        await until(lambda: join.numbers() == [1])
+        assert int(join.at(ODOM)[0].priority) == 5
 
 
 async def test_a_gateway_waits_for_its_daemon(join):

@@ -309,13 +309,15 @@ async def test_where_zenoh_cannot_listen_the_user_is_told(network, tmp_path):
         await open_session(params, tmp_path)
 
 
-async def test_a_router_that_is_away_is_said_once(tmp_path, caplog):
-    network = Network()
+async def test_a_router_that_is_away_is_said_once(tmp_path, caplog, monkeypatch):
+    network, tries, opened = Network(), [], zenoh.open
+    monkeypatch.setattr(zenoh, "open", lambda config: tries.append(1) or opened(config))
     params = FleetParams(name="mine", connect=[network.endpoint])
     opening = asyncio.ensure_future(open_session(params, tmp_path))
     await asyncio.sleep(1.8)
     assert not opening.done()
     assert caplog.text.count("no Zenoh router is reached") == 1
+    assert 1 < len(tries) <= 4, "every half second"
     await network.open(tmp_path)
     async with asyncio.timeout(20):
         opened = await opening
