@@ -112,6 +112,9 @@ def adds_up(report):
 @asynccontextmanager
 async def started(folder, more="", *, joins=True, is_read=True):
     joined = Joined(folder, more, is_read=is_read)
+    faults = []
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(lambda _, about: faults.append(about))
     running = asyncio.ensure_future(run_gateway(joined.daemon.setup, folder))
     try:
         await joined.daemon.is_heard()
@@ -124,6 +127,7 @@ async def started(folder, more="", *, joins=True, is_read=True):
         await asyncio.wait([running])
         joined.daemon.stop()
     assert running.cancelled()
+    assert faults == []
 
 
 @pytest.fixture
