@@ -76,6 +76,10 @@ class DaemonSide:
         """The daemon's answer to `verb`. Raises RefusedError and NoDaemonError."""
         return await self._asker.ask(verb, arguments)
 
+    def close(self) -> None:
+        """Ask no more."""
+        self._asker.close()
+
     def publisher(self) -> AsyncPublisher:
         """What publishes on the daemon's bus, also across its restarts. Raises UserError."""
         try:

@@ -73,8 +73,10 @@ class Commands:
             return Order((*operator, None), command, cdr, now) if leads else None
         if (*operator, number) in self._known:
             return Refusal.AGAIN
-        if number < self._newest.get(operator, -1):
-            return Refusal.OUTDATED
+        newest = self._newest.get(operator, -1)
+        if number <= newest:
+            # It came before, even if that is no longer known.
+            return Refusal.AGAIN if number == newest else Refusal.OUTDATED
         self._newest[operator] = number
         self._newest.move_to_end(operator)
         if len(self._newest) > MOST_OPERATORS:

@@ -4,6 +4,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Coroutine
+from contextlib import closing
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -57,14 +58,9 @@ class Gateway:
             lambda topic: self._classes.get(topic, "default"),
         )  # fmt: skip
         self._down = DownwardCommands(
-            self._own_id,
-            self._keys,
-            params.down,
-            session,
-            self._counts,
-            setup.name_on_bus,
+            self._own_id, self._keys, params.down, session, self._counts, setup.name_on_bus,
             self._daemon,
-        )
+        )  # fmt: skip
         self._bridge = Bridge(
             self._own_id,
             self._keys,
@@ -99,6 +95,11 @@ class Gateway:
             session.token(keys.bridges(self._own_id))
         if self._ros is not None:
             self._ros.start()
+        with closing(self._daemon):
+            await self._work()
+
+    async def _work(self) -> None:
+        """Pass on what comes from all sides."""
         async with self._daemon.publisher() as out, asyncio.TaskGroup() as group:
             group.create_task(self._daemon.listen(self._take))
             group.create_task(self._daemon.look(self._see))

@@ -216,6 +216,8 @@ class Session:
         try:
             found = list(answers(str(query.key_expr)))
         except BaseException:
+            # Or whoever asks would wait until garbage is collected.
+            query.drop()  # type: ignore[no-untyped-call]
             self._may_query.release()
             raise
 

@@ -134,9 +134,156 @@ def test_after_any_troubles_exactly_one_leads(seed):
         assert len(leaders) == 1
 
 
-def test_what_counts_is_what_is_lost_and_then_the_snr():
-    assert score(0.0, None) < score(0.0, 10.0) < score(0.0, 40.0) == score(0.0, 60.0)
-    assert score(0.5, 40.0) < score(0.1, 0.0)
+@pytest.mark.parametrize(
+    ("per", "snr_db", "is_"),
+    [
+        (0.0, None, 1.0), (0.25, None, 0.75), (0.25, -3.0, 0.75), (0.25, 0.0, 0.75),
+        (0.5, 20.0, 0.55), (0.5, 40.0, 0.6), (0.5, 60.0, 0.6), (1.0, 4.0, 0.01),
+    ],
+)  # fmt: skip
+def test_what_counts_is_what_is_lost_and_then_the_snr(per, snr_db, is_):
+    assert score(per, snr_db) == pytest.approx(is_)
+
+
+def led_by(gw, own_score=0.5, term=3, now=0.0, its_score=0.8):
+    """Gateway 7's part where `gw` leads."""
+    election = Election(7, LEASE_S, now)
+    election.claimed(Claim(gw, term, its_score), now)
+    election.hear(own_score, now)
+    return election
+
+
+def test_nobody_leads_at_first_and_a_gateway_listens_before_it_claims():
+    election = Election(7, LEASE_S, 10.0)
+    assert (election.leader, election.leads, election.score) == (None, False, None)
+    assert election.poll(20.0) is None, "it does not hear the robot"
+    election = Election(7, LEASE_S, 10.0)
+    election.hear(0.6, 10.0)
+    assert election.score == 0.6
+    # 0.5 s to listen, and 0.1 s less a tenth of its score.
+    assert election.poll(10.539) is None
+    assert election.poll(10.541) == Claim(7, 1, 0.6)
+    assert (election.leader, election.leads) == (7, True)
+    best = Election(7, LEASE_S, 0.0)
+    best.hear(1.1, 0.0)
+    assert best.poll(0.499) is None
+    assert best.poll(0.5) == Claim(7, 1, 1.1)
+
+
+def test_a_leader_repeats_its_claim_with_the_score_of_the_moment():
+    election = Election(7, LEASE_S, 0.0)
+    election.hear(0.5, 0.0)
+    first = election.poll(1.0)
+    election.hear(0.7, 1.1)
+    assert election.poll(1.299) is None
+    assert first == Claim(7, 1, 0.5)
+    assert election.poll(1.3) == Claim(7, 1, 0.7)
+    assert election.leads
+    assert election.poll(1.5) is None
+    assert election.poll(1.61) == Claim(7, 1, 0.7)
+    assert [election.poll(at) is None for at in (1.7, 9.0)] == [True, False]
+
+
+def test_a_leader_that_hears_nothing_gives_up_once_and_claims_anew_later():
+    election = Election(7, LEASE_S, 0.0)
+    election.hear(0.5, 0.0)
+    election.poll(1.0)
+    election.hear(None, 1.1)
+    assert election.poll(1.15) == Claim(7, 1, -1.0)
+    assert (election.leader, election.leads) == (None, False)
+    assert election.poll(1.2) is None
+    election.hear(0.5, 1.2)
+    assert election.poll(1.199) is None
+    assert election.poll(1.201) == Claim(7, 2, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("claim", "leader"),
+    [
+        (Claim(8, 4, 0.1), 8), (Claim(8, 3, 0.81), 8), (Claim(8, 3, 0.79), 5),
+        (Claim(8, 2, 1.0), 5), (Claim(8, 3, 0.8), 5), (Claim(4, 3, 0.8), 4),
+        (Claim(5, 1, 0.1), 5), (Claim(7, 9, 1.0), 5), (Claim(8, 9, -1.0), 5),
+        (Claim(5, 3, -1.0), None), (Claim(8, 9, -0.99), 8),
+    ],
+)  # fmt: skip
+def test_a_claim_counts_that_beats_the_leaders(claim, leader):
+    election = led_by(5)
+    election.claimed(claim, 0.1)
+    assert election.leader == leader
+
+
+def test_the_next_term_is_above_all_that_were_claimed():
+    election = led_by(5, own_score=0.0)
+    election.claimed(Claim(8, 9, -1.0), 0.1)
+    election.claimed(Claim(8, 2, 0.1), 0.1)
+    election.gone(5, 0.2)
+    assert election.poll(0.299) is None
+    assert election.poll(0.301) == Claim(7, 10, 0.0)
+
+
+def test_a_leader_that_says_nothing_is_lost_after_the_lease():
+    election = led_by(5, own_score=1.0, now=10.0, its_score=1.0)
+    election.claimed(Claim(5, 3, 1.0), 10.5)
+    assert election.poll(11.5) is None
+    assert election.leader == 5
+    # It is vacant from now on.
+    assert election.poll(11.51) == Claim(7, 4, 1.0)
+    patient = led_by(5, own_score=0.5, now=10.0)
+    assert patient.poll(11.01) is None
+    assert patient.leader is None
+    assert patient.poll(11.059) is None
+    assert patient.poll(11.061) == Claim(7, 4, 0.5)
+    deaf = led_by(5, own_score=None, now=10.0)
+    assert deaf.poll(11.01) is None
+    assert deaf.leader is None
+    assert deaf.poll(20.0) is None
+
+
+def test_only_the_leader_can_go_and_never_oneself_by_a_word_of_others():
+    election = led_by(5)
+    election.gone(8, 0.1)
+    assert election.leader == 5
+    election.gone(5, 0.1)
+    assert election.leader is None
+    election.gone(5, 5.0)
+    assert election.poll(0.2) == Claim(7, 4, 0.5), "since the first time"
+    election.gone(7, 0.3)
+    assert election.leads
+
+
+def test_who_is_better_by_a_margin_for_a_second_takes_over():
+    election = led_by(5, own_score=0.95, its_score=0.8)
+    for now in (0.5, 0.99):
+        election.claimed(Claim(5, 3, 0.8), now)
+        election.hear(0.95, now)
+        assert election.poll(now) is None
+    assert election.poll(1.0) == Claim(7, 4, 0.95)
+    assert election.leads
+    assert election.poll(1.1) is None
+    # Its own claim does not make it better than itself, and lasts until it is beaten.
+    election.hear(2.0, 1.2)
+    assert election.poll(1.25) is None
+    election.claimed(Claim(5, 5, 0.1), 1.26)
+    assert (election.leader, election.leads) == (5, False)
+    election.hear(0.2, 1.3)
+    election.hear(0.21, 1.4)
+    election.claimed(Claim(5, 5, 0.1), 2.2)
+    assert election.poll(2.39) is None
+    assert election.poll(2.4) == Claim(7, 6, 0.21)
+
+
+def test_a_margin_that_was_lost_for_a_moment_counts_anew():
+    election = led_by(5, own_score=0.95, its_score=0.8)
+    election.hear(0.9, 0.5)
+    election.hear(0.95, 0.6)
+    election.claimed(Claim(5, 3, 0.8), 0.9)
+    assert election.poll(1.59) is None
+    assert election.poll(1.6) == Claim(7, 4, 0.95)
+    election = led_by(5, own_score=0.95, its_score=0.8)
+    election.gone(5, 0.5)
+    election.claimed(Claim(8, 9, 0.8), 0.51)
+    election.claimed(Claim(8, 9, 0.8), 0.9)
+    assert election.poll(1.2) is None, "it was better than another one"
 
 
 @law(100)

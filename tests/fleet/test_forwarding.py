@@ -1,5 +1,6 @@
 """Of several gateways that hear a message, one puts it; none is lost, and late ones are learnt."""
 
+from math import inf
 from random import Random
 
 import pytest
@@ -176,6 +177,101 @@ def test_stop_messages_have_no_name_and_only_the_leader_puts_them():
     assert forwarding.heard("cmd_vel", None, "stop", 0.0, leads=False) is Turn.OTHERS
     assert forwarding.heard("cmd_vel", None, "stop", 0.0, leads=True) is Turn.OURS
     assert forwarding.due(9.0) == []
+
+
+def test_each_one_before_it_makes_a_gateway_wait_as_long_again_as_a_put_takes():
+    forwarding = Forwarding()
+    assert (forwarding.hold_s, forwarding.due_at) == (0.02, inf)
+    for rank, due_at in ((0, 1.02), (1, 1.03), (3, 1.05)):
+        forwarding.rank = rank
+        name = name_of(5 * rank)
+        assert forwarding.heard("odom", name, rank, 1.0, leads=False) is Turn.LATER
+        assert forwarding.due(due_at - 0.001) == []
+        assert forwarding.due_at == pytest.approx(due_at)
+        assert forwarding.due(due_at + 0.001) == [rank]
+    assert forwarding.put_for_others == 3
+
+
+def delays(*delays_s):
+    """What a gateway has learnt of a leader whose puts took so long."""
+    forwarding = Forwarding()
+    for number, delay_s in enumerate(delays_s):
+        name, at = name_of(5 * number), 10.0 * number
+        forwarding.heard("odom", name, number, at, leads=False)
+        forwarding.passed("odom", name, at + delay_s, by_leader=True)
+    return forwarding
+
+
+@pytest.mark.parametrize(
+    ("delays_s", "hold_s"),
+    [
+        ([0.01], 0.011),  # and a margin of 1 ms
+        ([0.0001], 0.002),  # never less
+        ([0.0012], 0.002),
+        ([0.0015], 0.00225),  # a margin is at most half of it
+        ([0.6], 0.5),  # nor more
+        ([0.01] * 39 + [0.04] * 61, 0.041),
+        ([0.01] * 40 + [0.016] * 5, 0.022),  # 6 ms from the middle to the slow ones
+        ([0.01] * 40 + [0.1] * 5, 0.15),
+        ([0.01] * 40 + [0.1], 0.011),  # one of many says nothing
+        ([0.2] * 10 + [0.01] * 60, 0.011),  # what was long ago is forgotten
+        ([0.2] * 10 + [0.01] * 59, 0.3),
+    ],
+)
+def test_how_long_to_wait_is_learnt_from_the_leaders_last_puts(delays_s, hold_s):
+    assert delays(*delays_s).hold_s == pytest.approx(hold_s)
+
+
+def test_the_time_between_two_in_line_is_learnt_too():
+    forwarding = delays(0.01, 0.01)
+    forwarding.rank = 2
+    forwarding.heard("odom", name_of(90), "a", 50.0, leads=False)
+    assert forwarding.due_at == pytest.approx(50.0 + 0.011 + 0.02)
+
+
+def test_what_came_from_zenoh_first_is_left_and_the_leaders_teaches():
+    forwarding = Forwarding()
+    assert not forwarding.passed("odom", name_of(0), 1.0, by_leader=False)
+    assert forwarding.heard("odom", name_of(0), "a", 1.1, leads=True) is Turn.OTHERS
+    assert forwarding.hold_s == 0.02
+    assert not forwarding.passed("odom", name_of(5), 1.0, by_leader=True)
+    assert forwarding.heard("odom", name_of(5), "a", 1.1, leads=False) is Turn.OTHERS
+    assert forwarding.hold_s == 0.002, "the put took no time"
+    assert forwarding.heard("odom", name_of(5), "a", 1.2, leads=False) is Turn.PAST
+    assert (forwarding.due_at, forwarding.put_twice) == (inf, 0)
+
+
+def test_a_second_put_of_the_same_message_changes_nothing():
+    forwarding = Forwarding()
+    forwarding.heard("odom", name_of(0), "a", 1.0, leads=False)
+    forwarding.heard("odom", name_of(5), "b", 1.005, leads=False)
+    assert forwarding.passed("odom", name_of(0), 1.01, by_leader=True)
+    assert not forwarding.passed("odom", name_of(0), 1.2, by_leader=True)
+    assert not forwarding.passed("odom", None, 1.2, by_leader=True)
+    assert forwarding.hold_s == pytest.approx(0.011)
+    assert forwarding.due_at == pytest.approx(1.025), "that of the one still held"
+    assert forwarding.due(1.025) == ["b"]
+    assert forwarding.due_at == inf
+
+
+def test_the_leader_notices_that_another_put_its_message_too():
+    forwarding = Forwarding()
+    assert forwarding.heard("odom", name_of(0), "a", 1.0, leads=True) is Turn.OURS
+    assert not forwarding.passed("odom", name_of(0), 1.01, by_leader=False)
+    assert (forwarding.put_twice, forwarding.put_for_others) == (1, 0)
+    assert (forwarding.hold_s, forwarding.due_at) == (0.02, inf)
+
+
+def test_a_message_is_known_for_two_seconds_whoever_told_of_it():
+    forwarding = Forwarding()
+    assert not forwarding.is_known("odom", name_of(0), 1.0)
+    forwarding.heard("odom", name_of(0), "a", 1.0, leads=True)
+    forwarding.passed("odom", name_of(5), 1.0, by_leader=True)
+    known = [
+        [forwarding.is_known(topic, name_of(number), now) for number in (0, 5)]
+        for topic, now in (("odom", 3.0), ("scan", 3.0), ("odom", 3.1))
+    ]
+    assert known == [[True, True], [False, False], [False, False]]
 
 
 @law(60)

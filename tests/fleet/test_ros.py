@@ -104,18 +104,6 @@ def test_a_node_commands_a_robot_once_through_one_gateway(desk):
 
 
 @pytest.mark.long
-def test_what_gateways_put_is_no_command(start_fleet):
-    fleet = start_fleet(f'ros_domain = {DOMAIN}\ndown = ["*"]\n')
-    wait_for(lambda: fleet.leader is not None)
-    with Publisher(runtime_dir=fleet.daemons[ROBOT].directory) as out:
-        for number in range(20):
-            out.send(f"/robot_{ROBOT}/odom", odometry(float(number)))
-            time.sleep(0.02)
-    wait_for(lambda: fleet.report(FIRST).up_taken == fleet.report(SECOND).up_taken == 20)
-    assert [fleet.report(each).down_taken for each in (FIRST, SECOND)] == [0, 0]
-
-
-@pytest.mark.long
 def test_a_late_node_gets_what_is_latched(start_fleet):
     fleet = start_fleet(
         f'ros_domain = {DOMAIN}\n[topic.map]\ndurability = "transient_local"\ndepth = 1\n'

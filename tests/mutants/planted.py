@@ -82,9 +82,7 @@ PLANTED = (
         "F3",
         "a command with the same number again is refused, however late",
         "sdrlinkd/fleet/commands.py",
-        "if number < self._newest.get(operator, -1):",
-        "if number <= self._newest.get(operator, -1):",
-        "this change is right: the product takes a command with the same number again after 5 s, "
-        "and is to be mended",
+        "if number <= newest:",
+        "if number < newest:",
     ),
 )
