@@ -25,7 +25,7 @@ from sdrlinkd.fleet import (
 )
 from sdrlinkd.fleet.testing import Attachment
 from sdrlinkd.wire import name_for
-from tests.fleet.beside import CDR, OWN, ROBOT, Daemon, Network, until, until_found
+from tests.fleet.beside import CDR, OWN, PATIENCE_S, ROBOT, Daemon, Network, until, until_found
 from tests.reported import topic
 
 KEYS = Keys("mine")
@@ -124,7 +124,7 @@ async def started(folder, more="", *, joins=True, is_read=True):
     finally:
         await joined.network.part()
         running.cancel()
-        await asyncio.wait([running])
+        await asyncio.wait([running], timeout=PATIENCE_S)
         joined.daemon.stop()
     assert running.cancelled()
     assert faults == []

@@ -718,5 +718,9 @@ async def test_answers_to_calls_come_on_the_gateways_own_topic(side, daemon):
         assert side.ros.counts == {}
         side.ros.hear(ROBOT, "robot_7/_sdrlink/calls", answer, leads=False)
         assert side.ros.counts == {"calls_answered": 1}
+        end = side.ros.follow(ROBOT, lambda *_: None)
+        side.notes.takes[f"{DOMAIN}/robot_2/set/a::srv::dds_::Set_/*"](question)
+        end()
+        assert side.ros.counts == {"calls_answered": 1, "calls_failed": 1}, "the robot has gone"
         task.cancel()
     assert ended == [1]

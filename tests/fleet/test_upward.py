@@ -210,6 +210,9 @@ def test_while_the_network_is_away_nothing_is_put_but_nodes_are_told(leader):
     ups.take(2.0)
     assert ups.ends == {"up_away": 1}
     assert (ups.put, len(ups.on_put)) == ([], leader != 3)
+    ups.session.is_reached = True
+    ups.up.put_again({ROBOT}, 3.0)
+    assert ups.put == [("odom", 1, 1_000_400, True, "bulk")]
 
 
 def test_what_was_held_when_the_network_went_is_put_again_later():
