@@ -50,6 +50,7 @@ class Bridge:
                 group.create_task(self._daemon.look(self._see))
                 group.create_task(self._operators.send_all(out))
         finally:
+            self._daemon.close()
             await asyncio.to_thread(self._server.stop)
             self._slow.close()
 
