@@ -129,6 +129,8 @@ def test_a_run_ends_in_time_and_names_each_item_that_is_at_fault(tmp_path):
         (Cost("slow", 9.0), 1, ""),
         (Cost("slow", 11.0), 1, "`long`"),
         (Cost("realtime", 11.0), 1, "`long`"),
+        (Cost("realtime", 11.0, most_s=20), 1, ""),
+        (Cost("realtime", 21.0, most_s=20), 1, "`long`"),
         (Cost("long", 1e4), 1, ""),
     ],
 )

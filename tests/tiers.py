@@ -3,7 +3,7 @@
 tier      items                                     where            CPU s an item
 quick     all that are not marked                   make quick       1
 slow      marked, or start a daemon                 make test        10
-realtime  radios or clocks in real time; alone      make test        10
+realtime  radios or clocks in real time; alone      make test        10, or `most_s` of the mark
 long      figures, whole systems, many trials       make test-long
 """
 
@@ -56,6 +56,8 @@ class Cost:
     shared_s: float = 0.0
     slowness: float = 1.0
     """Of the core, at that time."""
+    most_s: float = 0.0
+    """What it may cost; 0: what its tier allows."""
 
     @property
     def all_s(self) -> float:
@@ -120,7 +122,9 @@ class Suite:
         if nextitem is None or nextitem.path != item.path:
             self._end_what_is_left()
         own_s = spent_s() - self._begin_s - self._shared_s
-        cost = Cost(tier(item), own_s, self._shared_s, self._slow())
+        marker = item.get_closest_marker(which := tier(item))
+        most_s = marker.kwargs.get("most_s", 0.0) if marker else 0.0
+        cost = Cost(which, own_s, self._shared_s, self._slow(), most_s)
         item.user_properties.append(("cost", asdict(cost)))
         if too_dear(cost, 1.0) and (complaint := too_dear(cost, allowance())):
             pytest.fail(complaint, pytrace=False)
@@ -199,7 +203,7 @@ def allowance() -> float:
 
 def too_dear(cost: Cost, allowed: float) -> str:
     """Why an item belongs elsewhere; "" if it does not."""
-    most = allowed * MOST_S.get(cost.tier, float("inf"))
+    most = allowed * (cost.most_s or MOST_S.get(cost.tier, float("inf")))
     dearer = "slow" if cost.tier == "quick" and cost.own_s <= allowed * MOST_S["slow"] else "long"
     if cost.own_s > most:
         return (

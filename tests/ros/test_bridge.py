@@ -23,7 +23,7 @@ from tests.ros.team import (
 )
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.realtime
+pytestmark = pytest.mark.realtime(most_s=20)
 
 SECONDS = 3
 """How long the robots of a team send."""

@@ -10,7 +10,7 @@ from tests.waiting import wait_for
 
 __all__ = ["air", "hub", "world"]
 
-pytestmark = pytest.mark.realtime
+pytestmark = pytest.mark.realtime(most_s=20)
 
 ALLOW = ("-p", 'services.allow:=["/set", "/fibonacci"]')
 SUCCEEDED, CANCELED = 4, 5
