@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
+from math import ceil
 from pathlib import Path
 from random import Random
 
@@ -12,7 +13,7 @@ from tests.mutants.live import Live
 
 PACKAGES = ("link", "wire", "sealing", "bus", "fleet", "calls", "phy")
 BESIDE = {
-    "link": ("tests/link", "tests/fuzz"),
+    "link": ("tests/link", "tests/sealing", "tests/fuzz"),
     "wire": ("tests/wire", "tests/fuzz", "tests/link"),
     "sealing": ("tests/sealing", "tests/keyring", "tests/fuzz"),
     "bus": ("tests/bus", "tests/client", "tests/fuzz"),
@@ -81,6 +82,6 @@ def measured(packages: Iterable[Package], root: Path) -> list[Path]:
 
 
 def shares(packages: list[Package], n: int) -> list[int]:
-    """How many of `n` each package gets, in proportion to its lines."""
+    """How many of at least `n` each package gets, in proportion to its lines."""
     total = sum(each.n_lines for each in packages)
-    return [max(1, round(n * each.n_lines / total)) for each in packages]
+    return [ceil(n * each.n_lines / total) for each in packages]
