@@ -117,6 +117,7 @@ def test_rooms_of_the_link_import_down_and_reach_into_nobody():
     assert 1000 * chains / lines < 3
 
 
+@pytest.mark.slow
 def test_no_test_names_what_is_private():
     """In an import, or as text for `setattr` and its like; ruff (SLF001) finds the attributes."""
     may = re.compile(r"""(?:import|^ ) .*\b_[a-z]\w*,?$|["'.]_[a-z]\w*["']""", re.MULTILINE)

@@ -33,6 +33,7 @@ def fail(error):
     raise error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2, 5])
 def test_results_come_to_those_that_asked(processes):
     with Runs(processes) as runs:

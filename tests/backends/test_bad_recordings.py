@@ -162,6 +162,7 @@ def described(path, *arguments):
         return str(error)
 
 
+@pytest.mark.slow
 @law(250)
 @given(any_json | nearly, st.sampled_from(["", "ci8"]), st.sampled_from([None, 1e6]))
 def test_any_json_is_read_or_refused_in_words(hostile, metadata, type_name, rate_hz):

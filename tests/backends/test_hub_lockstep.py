@@ -81,6 +81,7 @@ def hear_a_run(folder, seed, dawdling):
     return heard, settled
 
 
+@pytest.mark.slow
 def test_one_seed_is_one_run_however_threads_are_timed(tmp_path):
     (one, reports), (same, again), (other, _) = (
         hear_a_run(tmp_path / f"{i}", *seeds) for i, seeds in enumerate([(5, 1), (5, 2), (6, 1)])

@@ -96,6 +96,7 @@ async def test_when_a_hub_comes_back_its_radios_go_on_behind_one_gap(tmp_path, m
     assert gap.n > 0.2 * RATE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("params", [RadioParams(), RadioParams(full_duplex=False)])
 async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave(
     tmp_path, params, monkeypatch

@@ -76,6 +76,7 @@ async def test_host_time_is_when_the_last_sample_was_there():
     assert last.host_ns - first.host_ns == pytest.approx(apart / RATE * 1e9, abs=10)
 
 
+@pytest.mark.slow
 async def test_an_unpaced_loopback_does_not_wait():
     async with opened(LoopbackRadio(AIR, block_s=1000.0, paced=False)) as radio:
         taken = await take(radio.blocks(), 2 * 1000 * RATE)
@@ -90,6 +91,7 @@ async def test_the_noise_has_the_power_asked_for(noise_dbfs):
     assert power_db == pytest.approx(noise_dbfs, abs=0.1)
 
 
+@pytest.mark.slow
 async def test_without_hearing_itself_there_is_only_noise():
     deaf = LoopbackRadio(noisy(), BLOCK_S, paced=False, hear_self=False)
     wanted = bursts(3)

@@ -48,6 +48,7 @@ def test_a_burst_arrives_with_the_snr_of_its_way_whatever_its_own_power(snr_db, 
     assert power_db(arrived[1]) - NOISE_DBFS == pytest.approx(7.0, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", ["rayleigh", "tdl-a", "tdl-c"])
 def test_bursts_that_fade_have_the_snr_of_their_way_on_average(profile):
     made = medium(2, profile=profile, snr_db=12.0, delay_spread_s=1e-6)

@@ -83,6 +83,7 @@ def test_who_is_deaf_misses_what_arrives_meanwhile_and_nothing_else(bursts, time
     assert np.array_equal(half[~deaf], full[~deaf])
 
 
+@pytest.mark.slow
 @law(80)
 @given(some_bursts, some_bursts, some_times, some_times, st.sampled_from(list(PROFILES)))
 def test_whenever_samples_are_taken_they_are_the_same(early, late, times, others, profile):

@@ -70,6 +70,7 @@ def test_an_unknown_name_is_told_with_those_known():
     assert str(caught.value) == f'backend: got "hackrf"; allowed: one of {listed}'
 
 
+@pytest.mark.slow
 def test_the_table_loads_no_radio():
     heavy = "numba", "phy", "SoapySDR", "backends.ether", "backends.loopback", "importlib.metadata"
     code = f"import sys, backends; print(*[each for each in {heavy} if each in sys.modules])"

@@ -131,6 +131,7 @@ def radio(more="", model="plain", **settings):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @needs_radio
 async def test_without_stamps_and_acknowledgements_bursts_are_counted_in():
     """Their position is only as accurate as the host's clock, but each is sent exactly once."""
@@ -174,6 +175,7 @@ async def test_what_comes_too_late_for_the_device_is_told():
             assert bus.stats(0).late == 1
 
 
+@pytest.mark.slow
 @needs_radio
 async def test_a_device_in_use_names_itself():
     name = f"used-{os.getpid()}"
@@ -183,6 +185,7 @@ async def test_a_device_in_use_names_itself():
                 await radio(f",bus={name},unit=0").open(TUNING)
 
 
+@pytest.mark.slow
 @needs_radio
 @pytest.mark.parametrize("debug", ["", "1"])
 async def test_what_drivers_print_is_shown_to_those_who_ask(monkeypatch, tmp_path, capfd, debug):

@@ -62,6 +62,7 @@ async def sent_at_last(each, blocks):
     return outcomes
 
 
+@pytest.mark.slow
 @needs_radio
 @pytest.mark.parametrize("tells", ["status", "return"])
 async def test_a_late_burst_is_given_up_and_holds_up_none_behind_it(bus, tells):
@@ -81,6 +82,7 @@ async def test_a_late_burst_is_given_up_and_holds_up_none_behind_it(bus, tells):
         assert 1 <= bus.stats(0).late <= n_late
 
 
+@pytest.mark.slow
 @needs_radio
 async def test_what_has_begun_to_leave_is_closed_and_does_not_go_again(bus):
     """The device's queue is shorter than the burst."""

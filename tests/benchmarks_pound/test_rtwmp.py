@@ -222,6 +222,7 @@ def test_the_most_important_message_of_the_network_goes_first(graph, data):
     assert [message.number for message, _ in heard.came] == [message.number for message in order]
 
 
+@pytest.mark.slow
 def test_a_long_message_goes_in_parts_and_a_shorter_passes_it():
     heard = Heard(3, chain(3))
     heard.network.send(Message(1, 0, 2, 65536, 10, 0.0))
@@ -321,6 +322,7 @@ def test_the_token_is_issued_again_after_the_death_of_its_holder(graph):
     assert ascending(heard.tokens_after(7.0))
 
 
+@pytest.mark.slow
 def test_the_network_begins_anew_when_all_who_know_the_token_are_gone():
     """The holder dies, and with it the node that sent it there: silence is all that is left."""
     params = SOON._replace(host_s=1e-3)

@@ -102,6 +102,7 @@ def test_pub_says_what_became_of_each_message(start_daemon, ctl):
     assert code == 1
 
 
+@pytest.mark.slow
 def test_pub_refuses_in_words(daemon, ctl):
     dir_ = ("--runtime-dir", daemon.directory)
     for arguments, says in (
@@ -264,6 +265,7 @@ def test_bag_play_and_info(start_daemon, ctl, recorded):
         assert (code, says in err) == (2, True), err
 
 
+@pytest.mark.slow
 def test_a_bag_whose_names_have_no_slash_is_played(daemon, ctl, tmp_path):
     messages = [("odom", "nav_msgs/msg/Odometry", 1_000_000 * i, bytes(724)) for i in range(20)]
     bag = ros2_bag(tmp_path / "bag", StoragePlugin.MCAP, messages)

@@ -22,6 +22,7 @@ def _drivers(monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
 
 
+@pytest.mark.slow
 @needs_radio
 def test_a_radio_that_keeps_time(capsys):
     assert run(["radio", "probe", "driver=loopback,model=usrp", "--rate", "5e6"]) == 0
@@ -34,6 +35,7 @@ def test_a_radio_that_keeps_time(capsys):
     assert "warning" not in told
 
 
+@pytest.mark.slow
 @needs_radio
 def test_a_half_duplex_radio_comes_with_what_to_expect(capsys):
     assert run(["radio", "probe", "driver=loopback,model=hackrf"]) == 0
@@ -45,6 +47,7 @@ def test_a_half_duplex_radio_comes_with_what_to_expect(capsys):
         assert part in told
 
 
+@pytest.mark.slow
 @needs_radio
 def test_for_programs(capsys):
     assert run(["radio", "probe", "driver=loopback,model=plain", "--json"]) == 0

@@ -25,6 +25,7 @@ def config(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_bursts_are_sent_and_decode_again(ctl, config, tmp_path):
     write_bursts(tmp_path / "rec")
     code, out, err = ctl("replay", tmp_path / "rec", "--config", config(), "--repeat", 2)
@@ -85,6 +86,7 @@ def test_bad_input_is_refused_in_one_line(ctl, tmp_path, arguments, says):
 SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=none"\n'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "arguments", "says"),
     [

@@ -39,6 +39,7 @@ def test_a_large_team_fits(width):
     assert max(map(len, lines)) <= width
 
 
+@pytest.mark.slow
 def test_the_picture(tmp_path):
     path = tmp_path / "routes.png"
     draw_routes(1, TEAM, path)

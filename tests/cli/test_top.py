@@ -88,6 +88,7 @@ async def test_of_a_quiet_daemon_all_is_seen():
         assert part in text
 
 
+@pytest.mark.slow
 async def test_a_daemon_that_goes_is_waited_for_and_comes_back():
     async with make_app().run_test(size=(80, 24)) as pilot:
         verdict = pilot.app.query_one("#verdict", Static)
@@ -101,6 +102,7 @@ async def test_a_daemon_that_goes_is_waited_for_and_comes_back():
         assert "DEGRADED" in str(verdict.render())
 
 
+@pytest.mark.slow
 async def test_the_daemon_is_asked_again_and_again():
     looks = iter([SNAPSHOT, None, busy()])
     app = TopApp(lambda: next(looks, busy()), Asked(), lambda: "waiting", 0.01)
@@ -216,6 +218,7 @@ async def test_a_daemon_without_anything_is_shown():
         assert "robot 1 (robot_1)" in text_of(pilot.app)
 
 
+@pytest.mark.slow
 async def test_an_answer_that_comes_when_it_has_ended_is_dropped():
     app = make_app()
     async with app.run_test(size=(80, 24)) as pilot:

@@ -22,6 +22,7 @@ nested = st.recursive(
 )
 
 
+@pytest.mark.slow
 @law(300)
 @given(st.dictionaries(st.text(max_size=40), plain, max_size=15))
 def test_what_it_packs_others_read(values):
@@ -29,6 +30,7 @@ def test_what_it_packs_others_read(values):
     assert unpack(pack_map(values)) == values
 
 
+@pytest.mark.slow
 @law(150)
 @given(nested)
 def test_what_others_pack_it_reads(value):
@@ -68,6 +70,7 @@ def test_a_huge_claim_costs_no_more_than_the_bytes_there_are(head):
     assert peak < 1_000_000
 
 
+@pytest.mark.slow
 @law(150)
 @given(nested, st.data())
 def test_a_cut_value_is_refused(value, data):

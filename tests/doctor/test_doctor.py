@@ -61,6 +61,7 @@ def test_line_by_line_for_people(write_config, tmp_path, capsys):
     assert "Traceback" not in out + err
 
 
+@pytest.mark.slow
 def test_a_hub_on_another_computer_is_checked_at_its_port(examine):
     with socket.socket() as port:
         port.bind(("127.0.0.1", 0))

@@ -157,6 +157,7 @@ def test_an_address_that_is_none_and_a_missing_library_are_one_sentence(monkeypa
     assert hint("metrics") in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @needs_prometheus
 def test_each_alert_fires_when_it_should(tmp_path):
     of = 'node="1",namespace="robot_1"'

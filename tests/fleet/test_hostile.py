@@ -185,6 +185,7 @@ def question(ended):
     return Question(b"\0\1\0\0", asked, reply, drop)
 
 
+@pytest.mark.slow
 def test_results_that_take_long_leave_room_for_calls_and_for_cancelling():
     (made, served), ended = calls(), []
     for kind, most in (("get_result", MOST_RESULTS), ("cancel_goal", MOST_ASKED)):

@@ -142,6 +142,7 @@ def test_messages_that_are_not_of_their_type_draw_nothing(context):
     assert scene.unreadable >= 3
 
 
+@pytest.mark.slow
 def test_a_slow_client_loses_the_oldest_and_holds_nobody_up(context, url, subscriptions):
     topics, n = ReceivedTopics(context), 20_000
     topics.take(message())

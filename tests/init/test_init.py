@@ -43,6 +43,7 @@ def checked(path, capsys):
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RADIOS)
 @pytest.mark.parametrize("robots", [1, 2, 7])
 def test_what_it_writes_passes_the_check(init, tmp_path, capsys, name, robots):

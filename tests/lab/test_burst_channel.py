@@ -291,6 +291,7 @@ def test_the_same_seed_gives_the_same_and_another_does_not():
     assert crowded(5) != crowded(6)
 
 
+@pytest.mark.slow
 def test_what_is_sensed_follows_what_was_before():
     """Time does not run backwards, and a carrier that has ended stays ended, whatever collides."""
     for seed in range(5):
@@ -306,6 +307,7 @@ def test_what_is_sensed_follows_what_was_before():
             before = senses
 
 
+@pytest.mark.slow
 def test_memory_is_bounded_even_when_every_burst_meets_the_next():
     made = medium(3)
     most = 0

@@ -196,6 +196,7 @@ def test_12_robots_with_minislots_for_two_minutes():
     assert max(age_s for _, age_s in got(sim).values()) < 2 * sim.stations[1].settled.access.round_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("policy", "least", "most"), [("minislot", 0.3, 0.9), ("tdma", 1, 1)])
 def test_those_who_do_not_hear_each_other_need_a_schedule(policy, least, most):
     """In a chain of three, the outer two collide in the middle without a schedule."""
@@ -216,6 +217,7 @@ def test_those_who_do_not_hear_each_other_need_a_schedule(policy, least, most):
     assert least <= share <= most
 
 
+@pytest.mark.slow
 def test_a_chain_keeps_one_schedule():
     seed = 10
     sim = simulation(
@@ -259,6 +261,7 @@ def test_the_same_seed_gives_the_same_and_another_does_not():
     assert outcome(1) != outcome(2)
 
 
+@pytest.mark.slow
 def test_it_may_be_run_in_steps():
     arrivals = small_messages(3, 10.0, 3.0, 1)
     ends = []

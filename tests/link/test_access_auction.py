@@ -303,6 +303,7 @@ def test_something_urgent_of_a_robot_with_bulk_waits_for_nobodys_default():
     assert max(waits) <= bound_s(n) + air.nodes[0].access.round_s + LONGEST_S
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", [Qos.LATENCY, Qos.DEFAULT])
 def test_nobody_waits_for_ever(most):
     air = make_air(4, 7)

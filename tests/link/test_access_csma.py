@@ -70,6 +70,7 @@ def test_it_collides_less_than_without_access_though_sometimes(traits, n):
     assert 0 < clashes["csma"] < clashes["none"] / 3
 
 
+@pytest.mark.slow
 def test_the_more_urgent_wait_less_on_average():
     waited_s = {qos: [] for qos in Qos}
     for seed in range(3):

@@ -217,6 +217,7 @@ def test_two_teams_that_meet_become_one():
         assert team.clashes(FORMED_S + 5) == []
 
 
+@pytest.mark.slow
 def test_a_plan_that_cannot_be_meant_is_refused():
     access = Team([1, 2], 1).robots[2].access
     good = Frame(1, 0, schedule_of((1, 2)), 0)

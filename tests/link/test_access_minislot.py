@@ -41,6 +41,7 @@ def first_start(access, idle_since, burst_at, qos=Qos.DEFAULT):
     raise AssertionError("it waits for ever")
 
 
+@pytest.mark.slow
 @radios
 @sizes
 def test_bursts_never_overlap_whoever_sends_whatever(traits, n):
@@ -85,6 +86,7 @@ def test_after_long_silence_all_may_begin_at_once(traits):
         air.assert_nobody_clashes()
 
 
+@pytest.mark.slow
 def test_clocks_may_drift_apart_while_nobody_sends():
     """Beacons come once per second; meanwhile two clocks of ±20 ppm drift apart by 40 µs."""
     for seed in range(12):
@@ -109,6 +111,7 @@ def test_a_burst_that_some_could_not_read_leads_to_no_collision(traits):
         air.assert_nobody_clashes()
 
 
+@pytest.mark.slow
 @radios
 def test_urgent_goes_before_default_of_any_other_at_a_carriers_end(traits):
     """Among the messages that waited when a burst ended, the next has the higher level."""

@@ -137,6 +137,7 @@ def test_a_root_that_nobody_follows_leaves_some_of_its_slots_to_others():
     assert used((1,)) == 1000, "who else could be there?"
 
 
+@pytest.mark.slow
 @radios
 def test_a_root_that_starts_again_disturbs_nobody(traits):
     """The others still keep its schedule."""

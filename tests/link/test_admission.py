@@ -358,6 +358,7 @@ def flow(topic=0, air=300, period_us=1000, size=40, qos=2):
     return ReservedFlow(topic, BROADCAST, qos, 64, air, period_us, size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "record",
     [
@@ -396,6 +397,7 @@ def test_flows_of_32_robots_are_held_at_most():
     assert words(air, 1) == {}
 
 
+@pytest.mark.slow
 def test_no_more_than_16_flows_of_a_robot_reserve_air():
     topics = [(f"topic_{i}", "std_msgs/String") for i in range(15)]
     air = Air((1, 2), hears={(1, 2), (2, 1)}, topics=topics, traits=TRAITS)

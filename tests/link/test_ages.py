@@ -50,6 +50,7 @@ def test_a_stale_stamp_is_forgotten():
     assert ages.take(1, 2, 3).at is None
 
 
+@pytest.mark.slow
 def test_stamps_that_wait_are_bounded():
     ages = Ages(timeout_s=1.0)
     ages.stamp(7, Stamp(1, 1, 500), 0.0)

@@ -125,6 +125,7 @@ def test_a_newcomer_is_told_all_at_once_and_within_its_share_of_the_air():
     assert len(late.heard_topics()[1]) == 60
 
 
+@pytest.mark.slow
 def test_declarations_take_two_per_cent_of_the_air_at_most():
     topics = OwnTopics(Registry(()), True, 250)
     for i in range(200):

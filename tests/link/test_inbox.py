@@ -93,6 +93,7 @@ def test_a_reboot_is_seen_and_its_pdus_are_not_taken_for_duplicates():
     assert rx(receiver).pdus_dropped["rx_dup"] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_any_bytes_keep_the_ledger(seed):
     rng = Random(seed)

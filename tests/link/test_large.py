@@ -41,6 +41,7 @@ def image(size, seed=SEED):
     return b"\0\1\0\0" + Random(seed).randbytes(size - 4)
 
 
+@pytest.mark.slow
 @law(30)
 @given(
     size=st.integers(12_000, 120_000), pdu_size=st.sampled_from((64, 100, 220)),

@@ -120,6 +120,7 @@ def clocks_of(link, until, step_s=0.01, submit_s=None):
     return found
 
 
+@pytest.mark.slow
 def test_clocks_ride_at_their_period_and_go_alone_within_their_share():
     alone = make_link(clock=ClockParams(period_s=0.2, share=0.004))
     alone.attach(PduLinkTraits(pdu_burst_s=(PDU_S,)), AccessParams(), RateParams())

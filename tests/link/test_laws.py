@@ -140,6 +140,7 @@ def test_whatever_the_air_does_nothing_is_made_up(seed):
     assert len(got) > 60, f"seed {seed}: positive control"
 
 
+@pytest.mark.slow
 @law(30)
 @given(st.integers(0, 2**32))
 def test_order_holds_within_a_topic(seed):

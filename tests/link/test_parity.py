@@ -73,6 +73,7 @@ def test_what_is_sent_is_only_sent_when_its_parity_is():
     assert sender.audit() == []
 
 
+@pytest.mark.slow
 def test_records_that_contradict_their_message_or_themselves_do_no_harm():
     """At the same time, every third message loses two fragments and has valid parity."""
     rng = Random(4)
@@ -134,6 +135,7 @@ def fading(seed, n):
     return strength < np.quantile(strength, 0.07)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_over_fading_links_memory_is_bounded_and_parity_helps(seed):
     lost = fading(seed, 6000)

@@ -191,6 +191,7 @@ def test_lifespan_and_size_hold_where_messages_arrive():
     assert receiver.audit() == []
 
 
+@pytest.mark.slow
 @law(30)
 @given(st.integers(0, 2**32))
 def test_what_has_expired_is_never_handed_over(seed):

@@ -136,6 +136,7 @@ def test_a_robot_that_falls_silent_is_spoken_to_slowly():
     assert set(world.mcs(1, 15.0)) == {0}
 
 
+@pytest.mark.slow
 def test_a_third_that_is_far_slows_broadcasts_only():
     def snr_db(to, src, _now):
         return 6.0 if 3 in (to, src) else 25.0
@@ -147,6 +148,7 @@ def test_a_third_that_is_far_slows_broadcasts_only():
     assert set(world.mcs(1, 12.0)) == {6}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [100, 2000], ids=["some", "more than the air carries"])
 def test_beacons_are_for_all_also_beside_messages_for_one(size):
     """Unicast at full rate must not hide us from robots farther away."""

@@ -126,6 +126,7 @@ def once_for_all(number):
     return lost
 
 
+@pytest.mark.slow
 def test_a_relay_repeats_what_its_neighbour_lacks():
     chain = {(2, 1), (1, 2), (3, 2), (2, 3)}
     relay = RelayParams(policy="flood")
@@ -147,6 +148,7 @@ def test_a_relay_repeats_what_its_neighbour_lacks():
         assert told_s == pytest.approx(age_s, abs=3e-3)
 
 
+@pytest.mark.slow
 def test_a_relay_lacks_pdus_too_and_their_ages_stay_true():
     chain = {(2, 1), (1, 2), (3, 2), (2, 3)}
     air = Air((1, 2, 3), lost=once(50), hears=chain, relay=RelayParams(policy="flood"), hop_limit=2)
@@ -157,6 +159,7 @@ def test_a_relay_lacks_pdus_too_and_their_ages_stay_true():
         assert told_s == pytest.approx(age_s, abs=3e-3)
 
 
+@pytest.mark.slow
 def test_fragments_come_again_while_their_message_is_waited_for():
     air = Air(lost=lambda to, src, n, pdu: src == 1 and n % 7 == 0)
     air.run(1.1)
@@ -181,6 +184,7 @@ def test_what_is_lost_inside_a_long_message_comes_though_that_one_is_complete(pa
     assert sorted(air.numbers(2)) == [*range(20), *range(100, 120)]
 
 
+@pytest.mark.slow
 def test_parity_that_repairs_a_message_spares_the_question():
     lost_every = 23
     params = {"classes": ClassesParams(default=DefaultParams(parity=0.2))}
@@ -204,6 +208,7 @@ def test_urgent_messages_of_a_short_life_are_sent_twice_if_wanted():
     assert air.links[1].report(air.now).repeats.pdus == 60
 
 
+@pytest.mark.slow
 def test_questions_for_nothing_get_nothing_and_are_counted():
     air = Air((1, 2))
     air.flow(1, 50)

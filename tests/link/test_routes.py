@@ -135,6 +135,7 @@ def test_what_is_only_for_neighbours_is_not_forwarded_and_receipts_are():
     assert (verdict.receipt, verdict.fate) == ("token", "delivered")
 
 
+@pytest.mark.slow
 def test_a_destination_answers_within_a_tenth_of_a_second():
     air = mesh((1, 2))
     air.run(2.0)
@@ -219,6 +220,7 @@ def test_a_tree_reaches_all_over_paths_that_are_nearly_the_best(seed):
         assert reached[robot] <= 1.1 ** len(best) * best[robot] + 1e-9
 
 
+@pytest.mark.slow
 def test_tables_are_bounded_whatever_is_told():
     link = make_link(1, relay=AUTO, hop_limit=4, pdu_size=128)
     rng = Random(5)

@@ -122,6 +122,7 @@ robots = st.integers(2, 6)
 losses = st.dictionaries(robots, st.sampled_from([0, 20, MAX_LOSS]), max_size=5)
 
 
+@pytest.mark.slow
 @law(200)
 @given(st.lists(st.tuples(robots, losses, st.sampled_from([0.1, 6.0])), max_size=30))
 def test_links_follow_from_the_newest_lsas_alone(told):

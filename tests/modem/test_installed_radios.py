@@ -114,6 +114,7 @@ def test_without_its_package_the_name_is_unknown():
     assert 'backend: got "acme"; allowed: one of "direct"' in refused('backend = "acme"')
 
 
+@pytest.mark.slow
 async def test_pdus_go_over_its_air(acme):
     config = parse_config(ACME)
     sent = list(bursts(3, 5))

@@ -20,6 +20,7 @@ from tests.modem.links import LONGEST_S, SIZE, Listener, bursts, config, running
 from tests.waiting import wait_for
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("paced", [True, False])
 async def test_every_pdu_comes_back_and_every_burst_is_settled(paced):
     sent = list(bursts(3, 12))
@@ -80,6 +81,7 @@ async def test_by_default_radios_hear_each_other_however_far_their_crystals_are_
         assert modem.report().max_cfo_hz == min(472e3, rate_hz / 4)
 
 
+@pytest.mark.slow
 async def test_the_next_burst_is_asked_for_only_when_the_one_before_is_nearly_out():
     async with running(config(True)) as (modem, listener):
         send(modem, listener, bursts(5, 6))
@@ -102,6 +104,7 @@ async def test_nobody_is_asked_while_there_is_nothing_to_send():
             await listener.until(lambda n=n: len(listener.settled_bursts) == n)
 
 
+@pytest.mark.slow
 async def test_a_carrier_tells_what_it_is():
     async with running(config(True, mcs=3)) as (modem, listener):
         traits = listener.traits
@@ -115,6 +118,7 @@ async def test_a_carrier_tells_what_it_is():
         assert modem.now() >= 0
 
 
+@pytest.mark.slow
 async def test_closing_settles_what_has_not_left():
     async with running(config(True)) as (modem, listener):
         send(modem, listener, bursts(6, 1))
@@ -182,6 +186,7 @@ def test_what_cannot_be_is_refused_in_words(tmp_path):
     make_modem(fast, 1, Random(1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("files", "says"),
     [

@@ -112,6 +112,7 @@ def is_running(spawned):
     return False
 
 
+@pytest.mark.slow
 async def test_a_closed_modem_leaves_no_process():
     async with opened(config(paced=True)) as (modem, _, _, spawned):
         assert is_running(spawned)
@@ -120,6 +121,7 @@ async def test_a_closed_modem_leaves_no_process():
         await modem.close()
 
 
+@pytest.mark.slow
 async def test_signals_to_the_group_end_it_only_with_its_daemon():
     """Ctrl-C and systemd reach both; the daemon still sends what is queued."""
     sent = list(bursts(5, 3))
@@ -131,6 +133,7 @@ async def test_signals_to_the_group_end_it_only_with_its_daemon():
         assert {outcome for _, outcome, _ in listener.settled_bursts} == {Outcome.SENT}
 
 
+@pytest.mark.slow
 async def test_when_it_is_killed_all_bursts_are_settled_once_and_the_link_is_absent():
     sent = list(bursts(6, 40))
     async with opened(config(paced=True)) as (modem, listener, task, spawned):
@@ -148,6 +151,7 @@ async def test_when_it_is_killed_all_bursts_are_settled_once_and_the_link_is_abs
     assert modem.now() >= before, "time goes on"
 
 
+@pytest.mark.slow
 async def test_a_process_that_hangs_is_ended(monkeypatch):
     monkeypatch.setattr(*CONSTANTS["hung_s"], 0.5)
     monkeypatch.setattr(*CONSTANTS["watch_s"], 0.1)
@@ -162,6 +166,7 @@ async def test_a_process_that_hangs_is_ended(monkeypatch):
     assert not is_running(spawned)
 
 
+@pytest.mark.slow
 async def test_it_ends_when_its_daemon_is_gone():
     async with opened(config(paced=True)) as (_, _, task, spawned):
         # As if the daemon had been killed: its end of the socket is closed, and nobody listens.
@@ -171,6 +176,7 @@ async def test_it_ends_when_its_daemon_is_gone():
         assert await asyncio.to_thread(spawned.process.wait, 60) == 0
 
 
+@pytest.mark.slow
 async def test_time_goes_on_after_a_restart():
     began_s = asyncio.get_running_loop().time() - 100.0
     modem, listener = make_modem(config(paced=True), 1, Random(1), began_s=began_s), Listener()

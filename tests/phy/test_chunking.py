@@ -73,6 +73,7 @@ def test_a_stream_far_longer_than_what_is_kept(size):
     assert np.abs(starts - len(period) * np.arange(n)).max() <= 2
 
 
+@pytest.mark.slow
 def test_the_streams_hold_what_they_are_meant_to():
     """The positive control: without gaps, every whole burst of ours is received, in order."""
     all_endings, n_sent, n_heard, n_odd = set(), 0, 0, 0

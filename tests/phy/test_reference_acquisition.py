@@ -140,6 +140,7 @@ def test_a_burst_is_acquired_alike(grid, centre_cycles):
     assert n_missed >= 1
 
 
+@pytest.mark.slow
 def test_headers_repetitions_are_folded_and_read_alike():
     """From clean to hopeless; many can only be read with the list."""
     n_listed = n_read = 0

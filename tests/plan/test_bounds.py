@@ -72,6 +72,7 @@ def told(tmp_path, capsys, policy, *options):
     return code, capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_the_waits_come_with_the_robots_of_the_configuration(tmp_path, capsys):
     code, said = told(tmp_path, capsys, "tdma")
     assert code == 0
@@ -83,6 +84,7 @@ def test_the_waits_come_with_the_robots_of_the_configuration(tmp_path, capsys):
     assert all(each["first_s"] > 0 for each in found)
 
 
+@pytest.mark.slow
 def test_a_range_of_robots_gives_a_curve(tmp_path, capsys):
     _, said = told(tmp_path, capsys, "tdma", "--robots", "1..32", "--json")
     found = json.loads(said.out)["bounds"]

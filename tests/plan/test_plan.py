@@ -156,6 +156,7 @@ def plan_text(tmp_path, capsys, *topics):
     return code, capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_the_plan_reads_like_this(tmp_path, capsys):
     code, told = plan_text(tmp_path, capsys, "scan:50:990", "odom:30:724", "map:6.67:64KiB")
     assert code == 0

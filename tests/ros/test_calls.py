@@ -66,6 +66,7 @@ class World:
             self.send(self.answerer.due(self.now), 2)
 
 
+@pytest.mark.slow
 @law(60)
 @given(st.integers(0, 1 << 30), st.floats(0, 0.6), st.floats(0, 0.5), st.floats(0, 2))
 def test_no_call_is_executed_twice_and_each_ends_once(seed, loss, twice, works_s):
@@ -84,6 +85,7 @@ def test_no_call_is_executed_twice_and_each_ends_once(seed, loss, twice, works_s
             assert ended.status == Status.TIMED_OUT
 
 
+@pytest.mark.slow
 def test_at_a_loss_of_a_fifth_all_of_200_calls_are_answered():
     world = World(1, loss=0.2)
     for i in range(200):
@@ -132,6 +134,7 @@ def test_a_result_that_nobody_takes_is_kept_and_a_call_is_not():
     assert not is_kept(result, "/x/_action/get_result")
 
 
+@pytest.mark.slow
 def test_a_result_comes_though_its_goal_is_long_and_the_servers_bridge_restarts():
     world = World(4, works_s=1200.0)
     result = world.asker.ask(1, "/x/_action/get_result", b"ab", 0.0)

@@ -121,6 +121,7 @@ def words(node, inner):
     return f"{text}[{length}]" if node == Nodetype.ARRAY else f"sequence<{text}>"
 
 
+@pytest.mark.slow
 def test_no_message_is_smaller_than_its_types_least_size():
     kinds = sorted(each for each in ros2_types().fielddefs if "/msg/" in each)
     assert len(kinds) > 100

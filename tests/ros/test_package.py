@@ -4,11 +4,14 @@ import re
 import shutil
 import subprocess
 
+import pytest
+
 from benchmarks.environments import BRIDGE
 from sdrlinkd import __version__
 from tests.ros.wheels import environment, python
 
 
+@pytest.mark.slow
 def test_the_package_installs_what_ros_looks_for(ros, tmp_path):
     source, root = tmp_path / "source", tmp_path / "root"
     shutil.copytree(BRIDGE, source)

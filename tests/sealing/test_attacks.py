@@ -76,6 +76,7 @@ class Delayer:
         return False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lies", [False, True])
 @pytest.mark.parametrize("after_s", [0.1, 0.2, 1.0])
 @pytest.mark.parametrize(("make", "victim"), [(pair, 2), (chain, 3)])

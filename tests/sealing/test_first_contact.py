@@ -91,6 +91,7 @@ def test_five_robots_with_tdma_start_cold():
         assert security(team, each).proven == [other for other in range(1, 6) if other != each]
 
 
+@pytest.mark.slow
 def test_a_chain_of_three():
     relay = RelayParams(policy="flood")
     robots = [Robot(each, [KEY], relay=relay, hop_limit=3) for each in (1, 2, 3)]

@@ -39,6 +39,7 @@ hostile = st.one_of(
 )
 
 
+@pytest.mark.slow
 @law(30)
 @given(st.sampled_from(["refuse", "accept"]), st.lists(hostile, max_size=60))
 def test_whatever_comes(clear, script):

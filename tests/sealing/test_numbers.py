@@ -22,6 +22,7 @@ events = st.one_of(
 )
 
 
+@pytest.mark.slow
 @law(300)
 @given(st.lists(events, max_size=40))
 def test_no_number_is_used_twice(script):

@@ -31,6 +31,7 @@ def test_parse_undoes_build(case):
     assert parse(octets, pdu_size) == pdu
 
 
+@pytest.mark.slow
 @law(200)
 @given(sized_pdus(), st.integers(0, 15))
 def test_identity_outlives_relays(case, hop):
@@ -39,6 +40,7 @@ def test_identity_outlives_relays(case, hop):
     assert identity(relayed) == identity(build(pdu, pdu_size))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["single", "fifteen", "two_padded", "message_and_stamp"])
 def test_identity_tells_any_other_bit(name):
     octets = BY_NAME[name].octets
@@ -63,6 +65,7 @@ def test_any_truncation_is_refused(vector):
         assert refused.value.reason == "rx_short"
 
 
+@pytest.mark.slow
 def test_any_bytes_parse_or_are_refused_by_name():
     rng = Random(SEED)
     verdicts = Counter()

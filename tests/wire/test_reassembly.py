@@ -132,6 +132,7 @@ def few_entries(draw):
 steps = st.lists(st.tuples(st.integers(0, 3), st.integers(0, 1), few_entries()), max_size=60)
 
 
+@pytest.mark.slow
 @law(300)
 @given(steps)
 def test_agrees_with_the_plainest_form(steps):
@@ -300,6 +301,7 @@ def test_a_message_too_large_for_the_bound_is_lost_by_name():
     assert reassembly.held == reassembly.held_bytes == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sources", [1, 5, 254])
 def test_the_ledger_adds_up_at_every_step(sources):
     rng = Random(SEED)

@@ -119,6 +119,7 @@ names = st.from_regex(r"\A/?[A-Za-z_][A-Za-z0-9_]{0,6}(/[A-Za-z_][A-Za-z0-9_]{0,
 types = st.from_regex(r"\A[A-Za-z][A-Za-z0-9_]{0,6}/(msg/)?[A-Za-z][A-Za-z0-9_]{0,6}\Z")
 
 
+@pytest.mark.slow
 @law()
 @given(
     st.lists(

@@ -162,6 +162,7 @@ def test_only_points_on_which_a_line_can_rest_are_looked_at(steps, slope):
     assert (vs - slope * xs).min() == (side.v - slope * side.x).min()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hz", [20, 50, 200])
 @pytest.mark.parametrize("seed", range(20))
 def test_samples_close_together_are_as_good_as_others(hz, seed):

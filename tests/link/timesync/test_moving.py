@@ -62,6 +62,7 @@ def test_the_bound_holds_10_s_after_a_jump_that_takes_so_long_to_be_seen():
     assert (np.abs(found.error_s[counts]) <= found.bound_s[counts])[10:].all(), f"seed {SEED}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["by_sample_wander", "by_sample_1ppm_a_min"])
 def test_without_wander_it_would_not(name, monkeypatch):
     monkeypatch.setattr(Wander, "allowed", lambda *_: 0.0)
@@ -77,6 +78,7 @@ def test_a_rate_that_jumps_is_known_again_with_fewer_samples():
     assert np.abs(found.error_s[after]).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_the_bound_of_a_steady_clock_is_little_more_than_its_stamps_resolution():
     rng = Random(SEED)
     envelope = DualEnvelope(2e-5)

@@ -19,6 +19,7 @@ def test_every_state_is_that_of_the_equations(case):
         assert [ours.n, ours.high_deviation_count, ours.high_rtt_count, ours.resets] == counts
 
 
+@pytest.mark.slow
 def test_the_vectors_are_those_of_the_literals():
     for case, rows in CHECKPOINTS.items():
         states = list(golden(case))
