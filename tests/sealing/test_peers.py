@@ -33,6 +33,14 @@ def test_each_number_is_taken_once_unless_it_is_too_old(oldest, numbers):
         assert window.newest == newest
 
 
+def test_what_is_as_late_as_it_may_be_is_taken_once():
+    window = Window()
+    for ticks in (100, 100 + LATE_TICKS):
+        window.take(ticks, 1)
+    told = [window.judge(*number) for number in ((99, 2), (100, 1), (100, 2))]
+    assert told == ["sec_replay", "rx_dup", ""]
+
+
 @law(60)
 @given(st.lists(st.tuples(st.integers(0, 50), st.floats(-5, 5)), min_size=1, max_size=30))
 def test_the_least_value_is_that_of_the_last_half_minute_and_a_little_more(steps):
