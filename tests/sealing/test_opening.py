@@ -68,6 +68,14 @@ def test_a_source_that_repeats_our_number_is_proven_if_its_times_fit(off):
         assert not opened(one, alone, 2.0 + other.node, 3, Contact(b"12345678", (other,))).is_proven
 
 
+def test_a_source_that_begins_anew_proves_itself_anew():
+    one, two = robot(1), robot(2)
+    met = Met(2, bytes([2]) * 4, 0)
+    assert opened(one, two, 1.0, 1, Contact(b"12345678", (met,))).is_proven
+    assert opened(one, two, 1.1, 2, Contact(b"12345678")).is_proven
+    assert not opened(one, two, 1.2, 3, Contact(b"87654321")).is_proven
+
+
 @pytest.mark.parametrize("src", [1, 2])
 def test_a_robot_that_has_the_next_key_says_so(src):
     one, two = robot(src), robot(9, (KEY, NEXT))
