@@ -4,7 +4,9 @@ from random import Random
 
 import pytest
 
+from sdrlinkd.link import AccessParams, RateParams
 from sdrlinkd.wire import Entry, Pdu, build
+from tests.link.radios import LOCKSTEP
 from tests.link.world import TOPICS, make_link, neighbors, received, rx, send_all
 
 
@@ -110,3 +112,29 @@ def test_any_bytes_keep_the_ledger(seed):
         link.hear(bytes(data[: rng.choice((64, 64, 64, rng.randrange(64)))]), rng.random())
         assert link.audit() == [], f"seed {seed}"
     assert rx(link).pdus_used > 100
+
+
+def test_air_is_heard_of_others_alone():
+    link = make_link(2, pdu_size=64)
+    for n in range(10):
+        at = n / 10
+        link.hear(pdu(src=1, seq=n), at, ended_at=at + 0.05)
+        link.hear(pdu(src=2, seq=n), at, ended_at=at + 0.09)
+        link.handle_timers(at + 0.1)
+    assert link.report(1.0).air_heard_pct == pytest.approx(50)
+
+
+def test_on_an_air_that_begins_anew_nothing_was_heard_before():
+    link = make_link(2, pdu_size=64)
+    link.hear(pdu(seq=1), 100.0)
+    link.attach(LOCKSTEP, AccessParams(), RateParams())
+    assert link.hear(pdu(seq=1), 0.5), "its number was of another time"
+    assert not link.hear(pdu(seq=1), 0.6)
+
+
+def test_a_pdu_that_comes_late_was_not_repeated():
+    link = make_link(2, pdu_size=64)
+    for seq in (0, 2, 1):
+        link.hear(pdu(seq=seq), 0.0)
+    (neighbor,) = link.report(0.0).neighbors
+    assert (neighbor.pdus_lost, neighbor.pdus_repaired) == (0, 0)

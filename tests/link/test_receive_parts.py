@@ -703,6 +703,15 @@ def test_a_relay_may_send_a_class_late_and_others_ahead(ahead, qos, at, number):
     assert made.number == number
 
 
+def test_classes_are_told_apart_after_their_numbers_are_known():
+    made = SequenceTrack()
+    for before, of_class in ((199, Qos.BULK), (200, Qos.BULK), (198, Qos.URGENT)):
+        made.heard(before, before, 0.0, forwarded=of_class)
+    made.heard(201, 201, 0.0, 3 * 256 + 201, forwarded=Qos.BULK)
+    made.heard((201 + 95) & 0xFF, 3, 0.1, forwarded=Qos.URGENT)
+    assert made.number == 3 * 256 + 201 + 95
+
+
 def test_a_track_that_has_heard_nothing():
     made = SequenceTrack()
     assert (made.newest, made.number, made.lost, made.restarts) == (-1, -1, 0, 0)

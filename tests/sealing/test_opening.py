@@ -101,6 +101,23 @@ def refusal(two, data, at):
     return refused.value.reason
 
 
+def test_of_a_robot_that_holds_our_key_now_nobody_is_told():
+    two, other = robot(2), robot(1, (NEXT,))
+    assert refusal(two, other.seal(pdu(1), 1.0), 1.0) == "sec_unknown_kid"
+    (told,) = two.notices(1.0)
+    assert "robot 1 seals with key 1, which is not installed here" in told
+    opened(robot(1), two, 1.1, 2)
+    assert two.notices(1.2) == []
+
+
+def test_a_disk_that_has_failed_stops_us_once_its_numbers_are_used():
+    one = robot(1)
+    one.memory.not_written("No space left on device")
+    assert one.may_send(59.0, 0, 1)
+    assert not one.may_send(60.0, 0, 1)
+    assert one.halted.endswith("cannot be written to disk: No space left on device")
+
+
 def test_what_does_not_open_is_refused_by_name():
     one, two, later = robot(1), robot(2), robot(1, (NEXT,))
     data = one.seal(pdu(1), 1.0)

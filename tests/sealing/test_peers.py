@@ -174,14 +174,14 @@ def test_peers_keep_the_numbers_of_each_key_apart():
     one.window(0).take(100, 0)
     peers.of(2).window(3).take(500, 1)
     peers.of(4).window(3)
-    assert peers.newest(3) == {1: 103, 2: 500}
+    peers.of(5).window(3).take(0, 0)
+    assert peers.newest(3) == {1: 103, 2: 500, 5: 0}
     assert peers.newest(0) == {1: 100}
     assert peers.newest(1) == {}
-    assert peers.was_opened(1)
-    assert not peers.was_opened(4)
+    assert [src for src in range(1, 6) if peers.was_opened(src)] == [1, 2, 5]
     peers.change_key(3)
     assert (peers.newest(3), peers.newest(0)) == ({}, {1: 100})
-    assert dict(peers) == {1: one, 2: peers.of(2), 4: peers.of(4)}
+    assert dict(peers) == {1: one, **{src: peers.of(src) for src in (2, 4, 5)}}
 
 
 def test_a_life_begins_once_until_the_clock_begins_anew():
