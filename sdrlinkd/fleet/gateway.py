@@ -96,20 +96,16 @@ class Gateway:
         if self._ros is not None:
             self._ros.start()
         with closing(self._daemon):
-            await self._work()
-
-    async def _work(self) -> None:
-        """Pass on what comes from all sides."""
-        async with self._daemon.publisher() as out, asyncio.TaskGroup() as group:
-            group.create_task(self._daemon.listen(self._take))
-            group.create_task(self._daemon.look(self._see))
-            group.create_task(self._tick())
-            if self._setup.config.fleet.down:
-                group.create_task(self._down.follow(out))
-            if self._ros is not None:
-                group.create_task(self._ros.run(out))
-            if self._setup.config.fleet.bridge:
-                group.create_task(self._bridge.run(out))
+            async with self._daemon.publisher() as out, asyncio.TaskGroup() as group:
+                group.create_task(self._daemon.listen(self._take))
+                group.create_task(self._daemon.look(self._see))
+                group.create_task(self._tick())
+                if self._setup.config.fleet.down:
+                    group.create_task(self._down.follow(out))
+                if self._ros is not None:
+                    group.create_task(self._ros.run(out))
+                if self._setup.config.fleet.bridge:
+                    group.create_task(self._bridge.run(out))
 
     def report(self) -> GatewayReport:
         """The gateway at this moment."""

@@ -67,11 +67,14 @@ class ReceivedTopics:
             channel.log(kept.payload, log_time=kept.time_ns, sink_id=client)
 
     def _keep(self, message: Message, at: float) -> None:
-        old = self._kept.pop(message.topic, None)
-        self._kept_bytes -= 0 if old is None else len(old.payload)
+        self._forget(message.topic)
         if self._kept_bytes + len(message.payload) <= MOST_KEPT_BYTES:
             self._kept[message.topic] = _Kept(message.payload, message.received_ns, at)
             self._kept_bytes += len(message.payload)
+
+    def _forget(self, topic: str) -> None:
+        if old := self._kept.pop(topic, None):
+            self._kept_bytes -= len(old.payload)
 
     def _open(self, topic: str, kind: str, old: Channel | None) -> Channel | None:
         """The channel of a topic that is new, or has got another type."""
@@ -81,7 +84,7 @@ class ReceivedTopics:
             return None
         if old is not None:
             old.close()
-            self._kept_bytes -= len(self._kept.pop(topic, _Kept(b"", 0, 0.0)).payload)
+            self._forget(topic)
         self._made += 1
         text = definition(kind)
         # A type that nobody here knows has a name and no definition.
