@@ -139,6 +139,8 @@ class Listener:
         self._joined = threading.Event()
         self._parts = []
         self._end = 0
+        self.is_slow = False
+        """Whether it has heard bursts later than they were sent, as this machine was busy."""
         self._is_over = False
         self._thread = threading.Thread(target=lambda: asyncio.run(self._listen()), daemon=True)
         self._thread.start()
@@ -167,6 +169,7 @@ class Listener:
                         np.zeros(block.n) if block.samples is None else block.samples
                     )
                     self._end = block.index + block.n
+                    self.is_slow = radio.counters["bursts_slow"] > 0
                     self._moved.notify_all()
                 if self._is_over:
                     return
@@ -194,6 +197,7 @@ class RadioOnHub(EtherRadio):
         self._listener = None
         self._first = 0
         self._params, self._paced = params, paced
+        self.is_recorded_late = False
 
     async def open(self, tuning):
         """Start the hub and the listener, and open the radio."""
@@ -215,4 +219,5 @@ class RadioOnHub(EtherRadio):
         await super().close()
         if listener is not None:
             record(self._sent, listener.stop()[self._first : end])
+            self.is_recorded_late = listener.is_slow
         self._stack.close()

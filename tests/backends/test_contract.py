@@ -31,8 +31,8 @@ from tests.backends.radios import (
 )
 
 pytestmark = pytest.mark.usefixtures("at_ease")
-TRIES = 3
-"""Of a radio in real time."""
+TRIES = 5
+"""How often a radio in real time that was late is tried."""
 
 
 def assert_sent(burst, report):
@@ -103,32 +103,26 @@ async def test_a_report_comes_with_the_block_of_the_last_sample(case, tmp_path):
 
 @transmitters
 async def test_a_burst_too_late_leaves_as_soon_as_it_can(case, tmp_path):
-    # A busy machine may make the burst, or the reception of it, later still.
-    for attempt in range(TRIES if case.paced else 1):
+    late = TxBurst(0, noise(300))
+    for attempt in range(TRIES):
         folder = tmp_path / str(attempt)
         folder.mkdir()
-        try:
-            await send_too_late(case, folder)
-        except AssertionError:
-            if attempt == TRIES - 1 or not case.paced:
-                raise
-        else:
-            break
-
-
-async def send_too_late(case, folder):
-    late = TxBurst(0, noise(300))
-    async with opened(case.make(folder)) as radio:
-        blocks = radio.blocks()
-        taken = await take(blocks, 10 * N)
-        now = taken[-1].index + taken[-1].n
-        (report,), more = await send(radio, blocks, [late])
+        async with opened(case.make(folder)) as radio:
+            blocks = radio.blocks()
+            taken = await take(blocks, 10 * N)
+            now = taken[-1].index + taken[-1].n
+            (report,), more = await send(radio, blocks, [late])
+        is_late = report.outcome is TxOutcome.LATE or getattr(radio, "is_recorded_late", False)
+        if case.paced and is_late:
+            continue  # The radio says itself that this machine was too busy for real time.
         assert_sent(late, report)
         assert report.start >= now
         # Waiting blocks were made before the burst; paced, late blocks may be larger.
-        if not radio.capabilities.paced:
+        if not case.paced:
             assert report.start <= now + (MAX_WAITING + 1) * N
-    assert_only(case, case.recorded(folder, taken + more), [(late, report)])
+        assert_only(case, case.recorded(folder, taken + more), [(late, report)])
+        return
+    pytest.fail("this machine is too busy for radios in real time")
 
 
 @transmitters
