@@ -10,6 +10,7 @@ import msgspec
 from sdrlinkd.client import ControlClient, NoDaemonError
 from sdrlinkd.process import Process, module
 from sdrlinkd.reports import Snapshot
+from tests.copied import origin
 from tests.waiting import wait_for
 
 MAIN = "import sys; from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1:]))"
@@ -17,7 +18,13 @@ MAIN = "import sys; from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1
 
 def sdrlinkctl(*arguments: object, **more: Any) -> Process:
     """A command that is not started yet; `more` as for a Process."""
-    return Process(module("sdrlinkd.cli", *arguments), name=f"sdrlinkctl {arguments[0]}", **more)
+    command = module("sdrlinkd.cli", *arguments)
+    return Process(command, name=f"sdrlinkctl {arguments[0]}", popen=origin.popen, **more)
+
+
+def sdrlinkd(*arguments: object, **more: Any) -> Process:
+    """A daemon that is not started yet; `more` as for a Process."""
+    return Process(module("sdrlinkd", *arguments), name="sdrlinkd", popen=origin.popen, **more)
 
 
 class Daemon(Process):
@@ -27,8 +34,15 @@ class Daemon(Process):
     """
 
     def __init__(self, directory: Path, config: Path, log: Path, before: str = "") -> None:
-        command = [sys.executable, "-c", before + MAIN, "--config", config]
-        super().__init__(command, name="sdrlinkd", log=log)
+        arguments = ["--config", str(config)]
+        if before:
+            super().__init__(
+                [sys.executable, "-c", before + MAIN, *arguments], name="sdrlinkd", log=log
+            )
+        else:
+            super().__init__(
+                module("sdrlinkd", *arguments), name="sdrlinkd", log=log, popen=origin.popen
+            )
         self.directory = directory
         self.config = config
         self.expected_exit = 0

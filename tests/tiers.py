@@ -23,6 +23,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.copied import origin
 from tests.cost import slowness, spent_s, started_by
 from tests.laws import FACTOR, USUAL, law
 from tests.machine import left_out
@@ -183,7 +184,7 @@ class Suite:
         self._shared_s += seconds
 
     def _end_what_is_left(self) -> None:
-        left = list(started_by(f"{RUN}={self._name}"))
+        left = [*started_by(f"{RUN}={self._name}"), *origin.left()]
         for pid, *_ in left:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)

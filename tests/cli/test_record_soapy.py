@@ -24,8 +24,6 @@ PATIENCE_S = 60
 ATTEMPTS = 3
 """A busy machine may lose samples, or be late, so tests are repeated up to this number."""
 
-pytestmark = pytest.mark.realtime
-
 
 @pytest.fixture
 def device(monkeypatch):
@@ -134,6 +132,7 @@ def begins_at(path, near, burst):
     return near - 200 + int(np.abs(np.correlate(x, burst, "valid")).argmax())
 
 
+@pytest.mark.realtime
 async def test_what_is_heard_is_annotated_to_the_sample_and_heard_again_when_replayed(
     device, tmp_path
 ):
@@ -188,6 +187,7 @@ async def test_what_is_heard_is_annotated_to_the_sample_and_heard_again_when_rep
         assert np.abs(np.diff(turn[:, 0]) - np.diff(told[:, 0])).max() <= 2
 
 
+@pytest.mark.realtime
 def test_the_commands_do_the_same(device, tmp_path, capsys):
     sent = write_bursts(tmp_path / "made")
     given = ("--frequency", "2.4e9", "--rate", "2e6", "--gain")

@@ -8,10 +8,10 @@ from backends import RadioParams
 from backends.testing import protocol
 from sdrlinkd.adapters import BuiltInRobot, due_messages
 from sdrlinkd.client import Publisher, Subscriber
-from sdrlinkd.process import Process, module
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
 from tests.backends.hubs import RawRadio, ask, serving
 from tests.daemon.ether import AIR
+from tests.programs import sdrlinkd
 from tests.waiting import wait_for
 
 BLOCK_S = 0.001
@@ -170,7 +170,7 @@ def test_a_daemon_plays_the_topics_of_a_bag_that_it_knows(start_daemon, tmp_path
 @pytest.mark.slow
 def test_a_bag_that_cannot_be_played_is_refused_in_one_line(write_config, tmp_path):
     config = write_config(tmp_path, '[play]\nbag = "none.mcap"\nduration_s = 1.0\n')
-    with Process(module("sdrlinkd", "--config", config)) as daemon:
+    with sdrlinkd("--config", config) as daemon:
         assert daemon.wait() == 2
     assert "none.mcap: no such file" in daemon.err()
     assert daemon.err().count("\n") == 1

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import sys
 import textwrap
 import threading
@@ -15,7 +14,7 @@ import zmq
 from sdrlinkd.client import Publisher, RefusedError, Subscriber
 from sdrlinkd.process import Process, wait_until
 from tests.laws import one_in
-from tests.programs import sdrlinkctl
+from tests.programs import sdrlinkctl, sdrlinkd
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
@@ -216,13 +215,10 @@ def test_a_demo_that_is_ended_leaves_nothing_behind(tmp_path, number, link):
 
 def test_a_second_instance_exits_with_2_and_the_first_is_unharmed(start_daemon):
     daemon = start_daemon()
-    second = subprocess.run(
-        [sys.executable, "-m", "sdrlinkd", "--config", str(daemon.config)],
-        capture_output=True, text=True, timeout=30,
-    )  # fmt: skip
-    assert second.returncode == 2
-    assert f"pid {daemon.pid}" in second.stderr
-    assert "Traceback" not in second.stderr
+    with sdrlinkd("--config", daemon.config) as second:
+        assert second.wait() == 2
+    assert f"pid {daemon.pid}" in second.err()
+    assert "Traceback" not in second.err()
     assert daemon.snapshot().state == "running"
 
 
@@ -233,13 +229,10 @@ def test_an_occupied_socket_is_named_and_left_alone(tmp_path, name, write_config
     with context.socket(zmq.PULL) as other:
         other.bind(f"ipc://{tmp_path}/{name}")
         config = write_config(tmp_path)
-        refused = subprocess.run(
-            [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
-            capture_output=True, text=True, timeout=30,
-        )  # fmt: skip
-        assert refused.returncode == 2
-        assert f"{name} is in use by another program" in refused.stderr
-        assert "Traceback" not in refused.stderr
+        with sdrlinkd("--config", config) as refused:
+            assert refused.wait() == 2
+        assert f"{name} is in use by another program" in refused.err()
+        assert "Traceback" not in refused.err()
         assert (tmp_path / name).exists()
     context.term()
 
@@ -299,17 +292,11 @@ def test_control_refuses_in_words(start_daemon):
 @pytest.mark.slow
 def test_config_check_prints_what_follows(write_config, tmp_path):
     config = write_config(tmp_path)
-    checked = subprocess.run(
-        [sys.executable, "-m", "sdrlinkd", "--check", "--config", str(config)],
-        capture_output=True, text=True, timeout=30,
-    )  # fmt: skip
-    assert checked.returncode == 0
-    assert "/robot_1/odom" in checked.stdout
+    with sdrlinkd("--check", "--config", config) as checked:
+        assert checked.wait() == 0
+    assert "/robot_1/odom" in checked.out()
     config.write_text("[link]\npdu_size = 7\n")
-    refused = subprocess.run(
-        [sys.executable, "-m", "sdrlinkd", "--check", "--config", str(config)],
-        capture_output=True, text=True, timeout=30,
-    )  # fmt: skip
-    assert refused.returncode == 2
-    assert refused.stderr.count("\n") == 1
-    assert "link.pdu_size: got 7; allowed: a whole number from 32 to 2047" in refused.stderr
+    with sdrlinkd("--check", "--config", config) as refused:
+        assert refused.wait() == 2
+    assert refused.err().count("\n") == 1
+    assert "link.pdu_size: got 7; allowed: a whole number from 32 to 2047" in refused.err()

@@ -11,10 +11,7 @@ from tests.laws import one_in
 from tests.pdulink.gnu_radio import flowgraph, no_gnu_radio
 from tests.waiting import wait_for
 
-pytestmark = [
-    pytest.mark.skipif(bool(no_gnu_radio()), reason=no_gnu_radio()),
-    pytest.mark.realtime,
-]
+pytestmark = pytest.mark.skipif(bool(no_gnu_radio()), reason=no_gnu_radio())
 N = 60
 PDU = 220
 SAMPLES = 200_000
@@ -105,6 +102,7 @@ def exchange(robots, n=N):
     return bodies, heard
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize(
     ("pattern", "form", "sample"),
     one_in(
@@ -127,6 +125,7 @@ def test_gnu_radio_as_the_air(start_daemon, endpoints, pattern, form, sample):
         assert robot.snapshot().carrier.counters["bad_messages"] == 0
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 def test_what_gnu_radio_loses_in_real_time_has_a_name(start_daemon, endpoints):
     one, two = endpoints
@@ -146,6 +145,7 @@ def test_what_gnu_radio_loses_in_real_time_has_a_name(start_daemon, endpoints):
     assert stalled or heard == [bodies, bodies], counters
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("phy", one_in(2, ["ofdm_phy", "gfsk_phy"]))
 @pytest.mark.parametrize("pattern", one_in(2, ["push", "pub"]))
 def test_gnu_radio_as_the_modem(start_daemon, endpoints, phy, pattern):
@@ -161,6 +161,7 @@ def test_gnu_radio_as_the_modem(start_daemon, endpoints, phy, pattern):
     assert heard == [bodies, bodies]
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 @pytest.mark.parametrize("transport", ["udp", "tcp"])
 def test_gnu_radio_as_the_modem_by_socket_pdu(start_daemon, free_ports, transport):

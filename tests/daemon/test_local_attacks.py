@@ -12,6 +12,7 @@ import zmq
 
 from sdrlinkd.client import IN_SOCKET, ControlClient, NoDaemonError, Publisher, endpoint
 from sdrlinkd.client.testing import is_prepared
+from tests.programs import sdrlinkd
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
@@ -84,12 +85,10 @@ def test_clients_do_not_talk_to_a_folder_that_another_user_prepared(tmp_path, mo
 @pytest.mark.slow
 @pytest.mark.parametrize("path", ["/dev/zero", "/", "/dev/null/x"])
 def test_a_configuration_that_is_none_is_refused_in_a_line(path):
-    done = subprocess.run(
-        [sys.executable, "-c", MAIN, "--config", path], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
-    assert path in done.stderr
+    with sdrlinkd("--config", path) as daemon:
+        assert daemon.wait() == 2
+    assert len(daemon.err().splitlines()) == 1
+    assert path in daemon.err()
 
 
 def test_sighup_before_it_is_ready_does_not_end_it(start_daemon):

@@ -15,6 +15,7 @@ from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.family import family
 from tests.conftest import ETC
 from tests.laws import one_in
+from tests.programs import sdrlinkd
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
@@ -141,13 +142,10 @@ def test_a_node_that_only_plays_says_why_nothing_leaves(start_daemon, tmp_path):
 )
 def test_what_cannot_be_is_refused_in_one_line(write_config, tmp_path, text, says):
     config = write_config(tmp_path, f'backend = "loopback"\n{text}\n')
-    done = subprocess.run(
-        [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
-        capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert says in done.stderr
-    assert done.stderr.count("\n") == 1
+    with sdrlinkd("--config", config) as daemon:
+        assert daemon.wait() == 2
+    assert says in daemon.err()
+    assert daemon.err().count("\n") == 1
 
 
 @pytest.mark.slow
@@ -156,14 +154,11 @@ def test_a_recording_of_another_rate_is_refused_in_one_line(write_config, tmp_pa
     general = {"core:datatype": "ci8", "core:sample_rate": 1e6}
     (tmp_path / "rec.sigmf-meta").write_text(json.dumps({"global": general}))
     config = write_config(tmp_path, 'backend = "iqfile"\n[iqfile]\nreceive = "rec"\n')
-    done = subprocess.run(
-        [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
-        capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
-    assert done.returncode == 2
-    *_, last = done.stderr.splitlines()
+    with sdrlinkd("--config", config) as daemon:
+        assert daemon.wait() == 2
+    *_, last = daemon.err().splitlines()
     assert "sampled at 1e+06 Hz, but the modem is set to 5e+06 Hz" in last
-    assert "Traceback" not in done.stderr
+    assert "Traceback" not in daemon.err()
 
 
 @pytest.mark.parametrize("paced", one_in(2, [False, True]))

@@ -7,7 +7,7 @@ import pytest
 from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.keyring import KeyFile, create_key_file, new_key
-from sdrlinkd.process import Process, module
+from tests.programs import sdrlinkd
 from tests.sealing import vectors
 from tests.waiting import wait_for
 
@@ -159,7 +159,7 @@ def test_without_key_or_state_it_does_not_start(
     if prepare == "no state":
         more = f'state_dir = "{key_file}/state"\n'
     path = write_config(folder, text(1, ports, keys, more=more))
-    with Process(module("sdrlinkd", "--config", str(path))) as daemon:
+    with sdrlinkd("--config", path) as daemon:
         assert daemon.wait() == 2
         (line,) = [each for each in daemon.err().splitlines() if each]
     assert says in line
@@ -169,7 +169,7 @@ def test_a_second_daemon_of_the_same_robot_is_refused(write_config, folder, team
     other = folder / "other"
     other.mkdir()
     path = write_config(other, text(1, [ports[0] + 1, ports[1] + 1], folder / "keys_1.toml"))
-    with Process(module("sdrlinkd", "--config", str(path))) as daemon:
+    with sdrlinkd("--config", path) as daemon:
         assert daemon.wait() == 2
         assert "another daemon seals as robot 1" in daemon.err()
 

@@ -3,8 +3,6 @@
 import os
 import signal
 import struct
-import subprocess
-import sys
 import sysconfig
 import time
 from pathlib import Path
@@ -16,13 +14,11 @@ from sdrlinkd.client import Publisher, Subscriber
 from tests.daemon.soapy import air, on_soapy
 from tests.laws import one_in
 from tests.machine import lacks
+from tests.programs import sdrlinkd
 from tests.soapy_loopback import missing, module_folder
 from tests.waiting import wait_for
 
-pytestmark = [
-    pytest.mark.skipif(bool(missing()), reason=missing()),
-    pytest.mark.realtime,
-]
+pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 DEBIAN = Path("/usr/lib/python3/dist-packages")
 BINDING = DEBIAN / f"_SoapySDR{sysconfig.get_config_var('EXT_SUFFIX')}"
 
@@ -58,6 +54,7 @@ def received(listener, n):
     return [listener.receive(20).payload for _ in range(n)]
 
 
+@pytest.mark.realtime
 def test_what_one_sends_the_other_republishes_both_ways(start_daemon, bus):
     name, air_ = bus
     robots = [start_daemon(on_soapy(robot, name)) for robot in (1, 2)]
@@ -82,6 +79,7 @@ def test_what_one_sends_the_other_republishes_both_ways(start_daemon, bus):
     wait_for(lambda: not air_.stats(1).is_transmitting)
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("fault", one_in(2, ["unplug", "crash"]))
 def test_traffic_flows_again_when_a_device_is_back(start_daemon, bus, fault):
     """Within 2 s; no message arrives twice, and the ledger adds up."""
@@ -124,6 +122,7 @@ BACK_S = 2.0
 """Time after its device is back in which a daemon must send and receive again."""
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 def test_a_driver_that_hangs_is_given_up(start_daemon, bus):
     name, air_ = bus
@@ -134,6 +133,7 @@ def test_a_driver_that_hangs_is_given_up(start_daemon, bus):
     wait_for(lambda: robot.snapshot().carrier.state == "up")
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 def test_faults_of_streams_are_counted_and_survived(start_daemon, bus):
     name, air_ = bus
@@ -162,6 +162,7 @@ def test_faults_of_streams_are_counted_and_survived(start_daemon, bus):
         assert_whole(robot)
 
 
+@pytest.mark.realtime
 def test_a_half_duplex_radio_sends_in_tx_windows(start_daemon, bus):
     name, air_ = bus
     half = {
@@ -189,6 +190,7 @@ def test_a_half_duplex_radio_sends_in_tx_windows(start_daemon, bus):
         assert_whole(robot)
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 def test_nothing_is_sent_unless_that_is_wanted(start_daemon, bus):
     name, air_ = bus
@@ -205,6 +207,7 @@ def test_nothing_is_sent_unless_that_is_wanted(start_daemon, bus):
     assert (stats.sent, stats.is_transmitting) == (0, False)
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 @pytest.mark.skipif(not BINDING.exists(), reason=lacks("python3-soapysdr"))
 def test_the_official_binding_serves_as_well(start_daemon, bus, tmp_path, monkeypatch):
@@ -224,20 +227,19 @@ def test_the_official_binding_serves_as_well(start_daemon, bus, tmp_path, monkey
         assert listener.receive(20).payload == body(7)
 
 
+@pytest.mark.slow
 def test_a_driver_that_is_not_installed_is_for_a_person_to_mend(write_config, tmp_path, bus):
     """Plugging in a device would not help."""
     config = on_soapy(1, bus[0]).replace("driver=loopback", "driver=hackrff")
-    done = subprocess.run(
-        [sys.executable, "-m", "sdrlinkd", "--config", str(write_config(tmp_path, config))],
-        capture_output=True, text=True, check=False, timeout=60,
-    )  # fmt: skip
-    assert done.returncode == 2, done.stderr
-    last = done.stderr.splitlines()[-1]
+    with sdrlinkd("--config", write_config(tmp_path, config)) as daemon:
+        assert daemon.wait() == 2, daemon.err()
+    last = daemon.err().splitlines()[-1]
     assert 'no driver "hackrff"' in last
     assert "libloopbackSupport.so" in last
-    assert "Traceback" not in done.stderr
+    assert "Traceback" not in daemon.err()
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("change", "state", "parts"),
@@ -290,6 +292,7 @@ def test_what_a_device_does_not_take_is_a_state_and_no_end(start_daemon, bus, ch
     assert_whole(robot)
 
 
+@pytest.mark.realtime
 def test_a_radio_that_comes_late_is_waited_for(start_daemon, bus):
     """Messages queued meanwhile are sent with their true age; those too old are dropped."""
     name, air_ = bus
@@ -322,6 +325,7 @@ LINK_S = 5.0
 """Time after its device appears in which a daemon must send and receive."""
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 def test_a_reload_that_makes_it_worse_ends_nothing(start_daemon, bus):
     name, air_ = bus
@@ -353,6 +357,7 @@ def test_a_reload_that_makes_it_worse_ends_nothing(start_daemon, bus):
     wait_for(lambda: "tx 30 dB" in robot.snapshot().carrier.detail, 20)
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 @pytest.mark.parametrize("mended_by", ["a reload", "replugging"])
 def test_settings_that_were_refused_are_tried_again(start_daemon, bus, mended_by):
@@ -383,6 +388,7 @@ def test_settings_that_were_refused_are_tried_again(start_daemon, bus, mended_by
     wait_for(lambda: robot.snapshot().carrier.state == "refused", 20)
 
 
+@pytest.mark.realtime
 @pytest.mark.long
 def test_who_obeys_is_stopped_while_the_radio_is_refused(start_daemon, bus):
     """No command can arrive then, and that is when a stop is needed most."""

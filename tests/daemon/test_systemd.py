@@ -180,6 +180,7 @@ def test_ready_means_reachable_for_the_group(manager: Manager):
 
 
 @pytest.mark.realtime
+@pytest.mark.parametrize("manager", ["abstract"], indirect=True)
 def test_the_watchdog_is_fed_in_time(manager: Manager):
     feeds = 8
     with manager.daemon():

@@ -14,8 +14,6 @@ from sdrlinkd.client import Publisher, Subscriber
 from tests.backends.hubs import serving
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.realtime
-
 AIR = {"rate_hz": 1e6, "frequency_hz": 2.45e9, "block_s": 0.001, "snr_db": 25.0}
 PPM = {1: 20.0, 2: -15.0}
 TWIST, ODOMETRY = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry"
@@ -41,7 +39,7 @@ robot = {source}
 
 @pytest.fixture
 def pair(start_daemon, tmp_path_factory):
-    """Two daemons that know each other's clocks."""
+    """Two daemons that hear each other, and the socket of the second one's chronyd."""
     hub = tmp_path_factory.mktemp("hub")
     radios = {robot: RadioParams(full_duplex=True, clock_ppm=ppm) for robot, ppm in PPM.items()}
     with serving(hub, radios, **AIR):
@@ -52,15 +50,16 @@ def pair(start_daemon, tmp_path_factory):
             )
             for robot in PPM
         ]
-
-        def know_each_other():
-            clocks = [each.clock for daemon in daemons for each in daemon.snapshot().link.neighbors]
-            return len(clocks) == 2 and all(
-                each and each.state == "synced" and each.samples > 10 for each in clocks
-            )
-
-        wait_for(know_each_other, 30)
+        wait_for(lambda: all(daemon.snapshot().link.neighbors for daemon in daemons))
         yield [*daemons, chrony]
+
+
+def know_each_other(*daemons):
+    """Whether both are in step with the other's clock."""
+    clocks = [each.clock for daemon in daemons for each in daemon.snapshot().link.neighbors]
+    return len(clocks) == 2 and all(
+        each and each.state == "synced" and each.samples > 10 for each in clocks
+    )
 
 
 def odometry(stamp_ns):
@@ -70,8 +69,10 @@ def odometry(stamp_ns):
     return to_cdr(message, ODOMETRY)
 
 
+@pytest.mark.realtime
 def test_two_daemons_know_how_late_everything_is(pair, capsys, monkeypatch):
     one, two, chrony = pair
+    wait_for(lambda: know_each_other(one, two), 30)
     n = 10
     with (
         Publisher(one.directory) as out,
@@ -128,6 +129,7 @@ def test_two_daemons_know_how_late_everything_is(pair, capsys, monkeypatch):
     assert "not heard; allowed: /rx_robot_1/odom" in capsys.readouterr().err
 
 
+@pytest.mark.realtime
 def test_a_command_topic_that_falls_silent_is_stopped_once(pair):
     one, two, _ = pair
     moves = to_cdr(empty(TWIST), TWIST)

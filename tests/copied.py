@@ -1,0 +1,177 @@
+"""Daemons and commands that begin as copies of a process that has loaded their program already.
+
+Loading takes a processor ten times as long as all the rest of a start. A copy has the environment
+of its origin: a test that sets another one gets a process that loads everything itself.
+"""
+
+import atexit
+import contextlib
+import gc
+import os
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+ORIGIN = (
+    "import runpy, sys; from tests.copied import serve; name, *sys.argv[1:] = serve(); "
+    "runpy.run_module(name, run_name='__main__', alter_sys=True)"
+)
+OF_A_TEST = {"PYTEST_CURRENT_TEST", "SDRLINK_TEST_RUN"}
+"""Variables that the program does not read. Without them, no test has left the origin behind."""
+MOST_OCTETS = 65536
+MOST_FILES = 1024
+
+
+class Copy:
+    """A process as a subprocess.Popen shows it. Its status comes through a pipe."""
+
+    def __init__(self, name: str, status: int, stdin: int) -> None:
+        self.name = name
+        self._status = os.fdopen(status, "rb", buffering=0)
+        self.stdin = os.fdopen(stdin, "wb")
+        self.pid = int(self._status.readline())
+        self.returncode: int | None = None
+        self.test = os.environ.get("PYTEST_CURRENT_TEST", "no test").rpartition(" ")[0]
+
+    def poll(self) -> int | None:
+        """The exit code, or minus the signal that ended it; None while it runs."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(0)
+        return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for its end. Raises TimeoutExpired."""
+        if self.returncode is None:
+            with selectors.DefaultSelector() as waiting:
+                waiting.register(self._status, selectors.EVENT_READ)
+                if not waiting.select(timeout):
+                    raise subprocess.TimeoutExpired(self.name, timeout or 0)
+            self.returncode = int(self._status.readline() or -signal.SIGKILL)
+            self._status.close()
+        return self.returncode
+
+    def send_signal(self, number: int) -> None:
+        """Send it a signal, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+
+class Origin:
+    """The process of which daemons are copies; it is started when the first one is."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._server: socket.socket | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._environment: dict[str, str] = {}
+        self._copies: list[Copy] = []
+
+    def popen(
+        self, command: list[str], *, env: Mapping[str, str], cwd: Path | None, stdout: int,
+        stderr: int, **more: Any,
+    ) -> "Copy | subprocess.Popen[bytes]":  # fmt: skip
+        """As subprocess.Popen with a pipe as stdin, for `python -m NAME ARGUMENTS`."""
+        with self._lock:
+            environment = {name: env[name] for name in env if name not in OF_A_TEST}
+            if self._server is None:
+                self._begin(environment)
+            if environment != self._environment:
+                return subprocess.Popen(
+                    command, env=env, cwd=cwd, stdout=stdout, stderr=stderr, **more
+                )
+            stdin, to_it = os.pipe()
+            status, from_it = os.pipe()
+            files = [stdin, stdout, stderr, from_it]
+            assert self._server is not None
+            told = "\0".join([str(cwd or Path.cwd()), *command[2:]])
+            socket.send_fds(self._server, [told.encode()], files)
+            os.close(stdin)
+            os.close(from_it)
+            copy = Copy(command[2], status, to_it)
+            self._copies = [each for each in self._copies if each.poll() is None] + [copy]
+            return copy
+
+    def _begin(self, environment: dict[str, str]) -> None:
+        self._environment = environment
+        self._server, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", ORIGIN], stdin=theirs, env=environment
+            )
+        atexit.register(self._end)
+
+    def _end(self) -> None:
+        assert self._server is not None
+        assert self._process is not None
+        self._server.close()
+        self._process.wait()
+
+    def left(self) -> Iterator[tuple[int, str, str]]:
+        """Each copy that runs: id, test that began it, command."""
+        for each in self._copies:
+            if each.poll() is None:
+                yield each.pid, each.test, each.name
+
+
+origin = Origin()
+
+
+def serve() -> list[str]:
+    """Answer each message on stdin with a copy of this process, and return it there: a command."""
+    _load()
+    server = socket.socket(fileno=os.dup(0))
+    waiting = selectors.DefaultSelector()
+    waiting.register(server, selectors.EVENT_READ)
+    while True:
+        for key, _ in waiting.select():
+            if key.data is not None:
+                pid, status = key.data
+                code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+                waiting.unregister(key.fd)
+                os.close(key.fd)
+                _tell(status, code)
+                os.close(status)
+                continue
+            told, files, *_ = socket.recv_fds(server, MOST_OCTETS, 4)
+            if not told:
+                sys.exit()
+            *streams, status = files
+            pid = os.fork()
+            if not pid:
+                os.setsid()
+                for number, stream in enumerate(streams):
+                    os.dup2(stream, number)
+                waiting.close()
+                server.close()
+                os.closerange(3, MOST_FILES)
+                folder, *arguments = told.decode().split("\0")
+                os.chdir(folder)
+                sys.path[0] = folder
+                return arguments
+            for stream in streams:
+                os.close(stream)
+            _tell(status, pid)
+            waiting.register(os.pidfd_open(pid), selectors.EVENT_READ, (pid, status))
+
+
+def _tell(status: int, number: int) -> None:
+    with contextlib.suppress(BrokenPipeError):
+        os.write(status, b"%d\n" % number)
+
+
+def _load() -> None:
+    """What a daemon loads in any case, and what a command does."""
+    import uvloop  # noqa: F401
+
+    from sdrlinkd import daemon  # noqa: F401
+    from sdrlinkd.adapters import knows
+    from sdrlinkd.cli import app  # noqa: F401
+
+    knows("std_msgs/msg/Header")
+    gc.freeze()
