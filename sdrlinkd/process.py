@@ -39,7 +39,7 @@ class Process:
     process ends with us, even when we are killed, if it calls `end_with_parent` or reads its
     input. Ctrl-C does not reach it: we pass that on, in the right order. With `session` false it
     stays in our session, so a scheduler that groups by sessions weighs it together with us; use
-    this where time is measured. `popen` starts it, as subprocess.Popen does.
+    this where time is measured. `popen` starts it in place of subprocess.Popen.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Process:
         folder: Path | None = None,
         umask: int = -1,
         session: bool = True,
-        popen: Callable[..., "subprocess.Popen[bytes]"] = subprocess.Popen,
+        popen: Callable[..., "subprocess.Popen[bytes]"] | None = None,
     ) -> None:
         self._command = [str(word) for word in command]
         self.name = name or Path(self._command[0]).name
@@ -74,7 +74,7 @@ class Process:
                 self._errors = self._kept(None)
                 self._read_to = 0
             given = os.environ if self._environment is None else self._environment
-            self._process = self._popen(
+            self._process = (self._popen or subprocess.Popen)(
                 self._command,
                 stdin=subprocess.PIPE,
                 stdout=self._output,

@@ -18,6 +18,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from sdrlinkd import parent
+
 ORIGIN = (
     "import runpy, sys; from tests.copied import serve; name, *sys.argv[1:] = serve(); "
     "runpy.run_module(name, run_name='__main__', alter_sys=True)"
@@ -69,7 +71,8 @@ class Origin:
         self._lock = threading.Lock()
         self._server: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._environment: dict[str, str] = {}
+        usual = {name: os.environ[name] for name in os.environ if name != "COLUMNS"}
+        self._environment = _without_test({**usual, parent.VARIABLE: "1"})
         self._copies: list[Copy] = []
 
     def popen(
@@ -78,10 +81,9 @@ class Origin:
     ) -> "Copy | subprocess.Popen[bytes]":  # fmt: skip
         """As subprocess.Popen with a pipe as stdin, for `python -m NAME ARGUMENTS`."""
         with self._lock:
-            environment = {name: env[name] for name in env if name not in OF_A_TEST}
             if self._server is None:
-                self._begin(environment)
-            if environment != self._environment:
+                self._begin()
+            if _without_test(env) != self._environment:
                 return subprocess.Popen(
                     command, env=env, cwd=cwd, stdout=stdout, stderr=stderr, **more
                 )
@@ -97,12 +99,11 @@ class Origin:
             self._copies = [each for each in self._copies if each.poll() is None] + [copy]
             return copy
 
-    def _begin(self, environment: dict[str, str]) -> None:
-        self._environment = environment
+    def _begin(self) -> None:
         self._server, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-c", ORIGIN], stdin=theirs, env=environment
+                [sys.executable, "-c", ORIGIN], stdin=theirs, env=self._environment
             )
         atexit.register(self._end)
 
@@ -117,6 +118,10 @@ class Origin:
         for each in self._copies:
             if each.poll() is None:
                 yield each.pid, each.test, each.name
+
+
+def _without_test(environment: Mapping[str, str]) -> dict[str, str]:
+    return {name: environment[name] for name in environment if name not in OF_A_TEST}
 
 
 origin = Origin()

@@ -13,9 +13,8 @@ import pytest
 from sdrlinkd.client import Subscriber
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab import LabOptions, load_scenario, run_lab
-from sdrlinkd.process import wait_until
+from sdrlinkd.process import Process, module, wait_until
 from tests.lab.scenarios import processes_of, write_scenario
-from tests.programs import sdrlinkctl
 
 MESSAGES = 15
 """What each robot sends: 1.5 s of velocity commands at 10 Hz."""
@@ -164,7 +163,8 @@ def test_a_lab_that_is_interrupted_leaves_nothing_behind(tmp_path_factory):
     folder = tmp_path_factory.mktemp("end")
     path = write_scenario(folder, pace="realtime")
     arguments = ("lab", path, "--out", folder / "out", "--duration", "600")
-    with sdrlinkctl(*arguments, environment={**os.environ, "TMPDIR": str(folder)}) as lab:
+    command, environment = module("sdrlinkd.cli", *arguments), {**os.environ, "TMPDIR": str(folder)}
+    with Process(command, environment=environment) as lab:
         wait_until(lambda: len(list(folder.glob("sdrlink-*/robot_*/ctl.sock"))) == 2, 60, lab)
         for robot in folder.glob("sdrlink-*/robot_*"):
             with Subscriber(directory=robot, timeout_s=60) as heard:
