@@ -90,7 +90,7 @@ class Suite:
         """Watch the item; one in real time waits until no other item runs."""
         which = tier(item)
         limits = LIMITS.get(which, USUAL_LIMITS)
-        with self._turn(alone=item.get_closest_marker("realtime") is not None):
+        with self._turn(alone=_is_alone(item)):
             self._begin_s, self._shared_s = spent_s(), 0.0
             if self.is_strict and FACTOR <= 1:
                 self._watchdog.watch(item.nodeid, limits)
@@ -198,6 +198,10 @@ def tier(item: pytest.Item) -> str:
     return next((name for name in reversed(TIERS) if item.get_closest_marker(name)), TIERS[0])
 
 
+def _is_alone(item: pytest.Item) -> bool:
+    return item.get_closest_marker("realtime") is not None
+
+
 def allowance() -> float:
     """How many times the limits of the tiers an item may cost in this run, on a usual core."""
     is_busy = "CI" in os.environ or os.getloadavg()[0] > 2 * (os.cpu_count() or 1)
@@ -257,7 +261,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark slow tests: a daemon takes a second to start, unless a test is marked as quick.
 
-    Those for `make fresh` run only there. Those in real time come last.
+    Those for `make fresh` run only there. Those in real time come last; before them come files
+    without slow tests, so that all workers have something to do until then.
     """
     later = [] if os.environ.get(FRESH) else [i for i in items if i.get_closest_marker("fresh")]
     if later:
@@ -267,7 +272,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         starts = "start_daemon" in getattr(item, "fixturenames", ())
         if starts and not item.get_closest_marker("quick"):
             item.add_marker(pytest.mark.slow)
-    items.sort(key=lambda item: item.get_closest_marker("realtime") is not None)
+    slow = {item.path for item in items if tier(item) == "slow"}
+    items.sort(key=lambda item: (_is_alone(item), item.path not in slow))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
