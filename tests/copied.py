@@ -71,9 +71,13 @@ class Origin:
         self._lock = threading.Lock()
         self._server: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
+        self._environment: dict[str, str] = {}
+        self._copies: list[Copy] = []
+
+    def settle(self) -> None:
+        """Take the environment as it is now: test modules are loaded, and no test has begun."""
         usual = {name: os.environ[name] for name in os.environ if name != "COLUMNS"}
         self._environment = _without_test({**usual, parent.VARIABLE: "1"})
-        self._copies: list[Copy] = []
 
     def popen(
         self, command: list[str], *, env: Mapping[str, str], cwd: Path | None, stdout: int,
@@ -81,12 +85,12 @@ class Origin:
     ) -> "Copy | subprocess.Popen[bytes]":  # fmt: skip
         """As subprocess.Popen with a pipe as stdin, for `python -m NAME ARGUMENTS`."""
         with self._lock:
-            if self._server is None:
-                self._begin()
             if _without_test(env) != self._environment:
                 return subprocess.Popen(
                     command, env=env, cwd=cwd, stdout=stdout, stderr=stderr, **more
                 )
+            if self._server is None:
+                self._begin()
             stdin, to_it = os.pipe()
             status, from_it = os.pipe()
             files = [stdin, stdout, stderr, from_it]
