@@ -1,31 +1,32 @@
 """Daemons and commands that begin as copies of a process that has loaded their program already.
 
-Loading takes a processor ten times as long as all the rest of a start. A copy has the environment
-of its origin: a test that sets another one gets a process that loads everything itself.
+Loading takes a processor ten times as long as all the rest of a start. A test that sets variables
+of the interpreter or of the linker gets a process that loads everything itself.
 """
 
 import atexit
 import contextlib
 import gc
+import json
 import os
 import selectors
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
-
-from sdrlinkd import parent
 
 ORIGIN = (
     "import runpy, sys; from tests.copied import serve; name, *sys.argv[1:] = serve(); "
     "runpy.run_module(name, run_name='__main__', alter_sys=True)"
 )
 OF_A_TEST = {"PYTEST_CURRENT_TEST", "SDRLINK_TEST_RUN"}
-"""Variables that the program does not read. Without them, no test has left the origin behind."""
+"""Without these variables, no test has left the origin behind."""
+READ_AT_THE_START = ("PYTHON", "LD_")
 MOST_OCTETS = 65536
 MOST_FILES = 1024
 
@@ -71,13 +72,8 @@ class Origin:
         self._lock = threading.Lock()
         self._server: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._environment: dict[str, str] = {}
         self._copies: list[Copy] = []
-
-    def settle(self) -> None:
-        """Take the environment as it is now: test modules are loaded, and no test has begun."""
-        usual = {name: os.environ[name] for name in os.environ if name != "COLUMNS"}
-        self._environment = _without_test({**usual, parent.VARIABLE: "1"})
+        self._environment = {k: v for k, v in os.environ.items() if k not in OF_A_TEST}
 
     def popen(
         self, command: list[str], *, env: Mapping[str, str], cwd: Path | None, stdout: int,
@@ -85,7 +81,7 @@ class Origin:
     ) -> "Copy | subprocess.Popen[bytes]":  # fmt: skip
         """As subprocess.Popen with a pipe as stdin, for `python -m NAME ARGUMENTS`."""
         with self._lock:
-            if _without_test(env) != self._environment:
+            if _start(env) != _start(self._environment):
                 return subprocess.Popen(
                     command, env=env, cwd=cwd, stdout=stdout, stderr=stderr, **more
                 )
@@ -95,7 +91,7 @@ class Origin:
             status, from_it = os.pipe()
             files = [stdin, stdout, stderr, from_it]
             assert self._server is not None
-            told = "\0".join([str(cwd or Path.cwd()), *command[2:]])
+            told = json.dumps([str(cwd or Path.cwd()), dict(env), *command[2:]])
             socket.send_fds(self._server, [told.encode()], files)
             os.close(stdin)
             os.close(from_it)
@@ -124,8 +120,8 @@ class Origin:
                 yield each.pid, each.test, each.name
 
 
-def _without_test(environment: Mapping[str, str]) -> dict[str, str]:
-    return {name: environment[name] for name in environment if name not in OF_A_TEST}
+def _start(environment: Mapping[str, str]) -> dict[str, str]:
+    return {k: v for k, v in environment.items() if k.startswith(READ_AT_THE_START)}
 
 
 origin = Origin()
@@ -159,7 +155,10 @@ def serve() -> list[str]:
                 waiting.close()
                 server.close()
                 os.closerange(3, MOST_FILES)
-                folder, *arguments = told.decode().split("\0")
+                folder, environment, *arguments = json.loads(told)
+                os.environ.clear()
+                os.environ.update(environment)
+                tempfile.tempdir = None
                 os.chdir(folder)
                 sys.path[0] = folder
                 return arguments

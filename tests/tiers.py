@@ -85,10 +85,6 @@ class Suite:
         self._watchdog = Watchdog()
         self._watchdog.start()
 
-    def pytest_collection_finish(self) -> None:
-        """From now on, programs can be begun as copies of one that is loaded."""
-        origin.settle()
-
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
         """Watch the item; one in real time waits until no other item runs."""
