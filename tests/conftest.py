@@ -8,6 +8,7 @@ import pytest
 
 import phy
 from sdrlinkd.link import Lives
+from tests.copied import origin
 from tests.programs import Daemon
 from tests.tiers import (
     pytest_collection_modifyitems,
@@ -75,15 +76,23 @@ def write_config() -> Callable[..., Path]:
     return write_settings
 
 
+@pytest.fixture(scope="session")
+def _loaded() -> None:
+    """A program of which daemons are copies. That it loads is not charged to the first of them."""
+    origin.loaded()
+
+
 @pytest.fixture
-def start_daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Daemon]]:
+def start_daemon(
+    tmp_path_factory: pytest.TempPathFactory, _loaded: None
+) -> Iterator[Callable[..., Daemon]]:
     """Starts daemons and stops them in order; each must end cleanly, without a traceback."""
     with daemons(tmp_path_factory) as start:
         yield start
 
 
 @pytest.fixture(scope="module")
-def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+def daemon(tmp_path_factory: pytest.TempPathFactory, _loaded: None) -> Iterator[Daemon]:
     """One daemon with the default settings, for all tests of a module that leave it as it is."""
     with daemons(tmp_path_factory) as start:
         yield start()

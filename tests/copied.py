@@ -1,7 +1,8 @@
 """Daemons and commands that begin as copies of a process that has loaded their program already.
 
-Loading takes a processor ten times as long as all the rest of a start. A test that sets variables
-of the interpreter or of the linker gets a process that loads everything itself.
+Loading takes a processor ten times as long as all the rest of a start. The fork server of
+multiprocessing would load the main module of the test run into each copy. A test that sets
+variables of the interpreter or of the linker gets a process that loads everything itself.
 """
 
 import atexit
@@ -62,16 +63,16 @@ class Copy:
     def send_signal(self, number: int) -> None:
         """Send it a signal, unless it has ended."""
         if self.poll() is None:
-            os.kill(self.pid, number)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self.pid, number)
 
 
 class Origin:
-    """The process of which daemons are copies; it is started when the first one is."""
+    """The process of which others are copies; it is started when it is needed."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._server: socket.socket | None = None
-        self._process: subprocess.Popen[bytes] | None = None
         self._copies: list[Copy] = []
         self._environment = {k: v for k, v in os.environ.items() if k not in OF_A_TEST}
 
@@ -80,38 +81,34 @@ class Origin:
         stderr: int, **more: Any,
     ) -> "Copy | subprocess.Popen[bytes]":  # fmt: skip
         """As subprocess.Popen with a pipe as stdin, for `python -m NAME ARGUMENTS`."""
+        if _at_the_start(env) != _at_the_start(self._environment):
+            return subprocess.Popen(command, env=env, cwd=cwd, stdout=stdout, stderr=stderr, **more)
+        server = self.loaded()
+        stdin, to_it = os.pipe()
+        status, from_it = os.pipe()
+        told = json.dumps([str(cwd or Path.cwd()), dict(env), *command[2:]])
+        socket.send_fds(server, [told.encode()], [stdin, stdout, stderr, from_it])
+        os.close(stdin)
+        os.close(from_it)
+        copy = Copy(command[2], status, to_it)
         with self._lock:
-            if _start(env) != _start(self._environment):
-                return subprocess.Popen(
-                    command, env=env, cwd=cwd, stdout=stdout, stderr=stderr, **more
-                )
-            if self._server is None:
-                self._begin()
-            stdin, to_it = os.pipe()
-            status, from_it = os.pipe()
-            files = [stdin, stdout, stderr, from_it]
-            assert self._server is not None
-            told = json.dumps([str(cwd or Path.cwd()), dict(env), *command[2:]])
-            socket.send_fds(self._server, [told.encode()], files)
-            os.close(stdin)
-            os.close(from_it)
-            copy = Copy(command[2], status, to_it)
             self._copies = [each for each in self._copies if each.poll() is None] + [copy]
-            return copy
+        return copy
 
-    def _begin(self) -> None:
-        self._server, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", ORIGIN], stdin=theirs, env=self._environment
-            )
-        atexit.register(self._end)
-
-    def _end(self) -> None:
-        assert self._server is not None
-        assert self._process is not None
-        self._server.close()
-        self._process.wait()
+    def loaded(self) -> socket.socket:
+        """Its socket, once it has loaded the program."""
+        with self._lock:
+            if self._server is None:
+                self._server, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+                with theirs:
+                    process = subprocess.Popen(
+                        [sys.executable, "-c", ORIGIN], stdin=theirs, env=self._environment
+                    )
+                self._server.recv(1)
+                # Last registered, first called: it ends when nobody can talk to it any more.
+                atexit.register(process.wait)
+                atexit.register(self._server.close)
+            return self._server
 
     def left(self) -> Iterator[tuple[int, str, str]]:
         """Each copy that runs: id, test that began it, command."""
@@ -120,28 +117,24 @@ class Origin:
                 yield each.pid, each.test, each.name
 
 
-def _start(environment: Mapping[str, str]) -> dict[str, str]:
-    return {k: v for k, v in environment.items() if k.startswith(READ_AT_THE_START)}
-
-
 origin = Origin()
 
 
+def _at_the_start(environment: Mapping[str, str]) -> dict[str, str]:
+    return {k: v for k, v in environment.items() if k.startswith(READ_AT_THE_START)}
+
+
 def serve() -> list[str]:
-    """Answer each message on stdin with a copy of this process, and return it there: a command."""
+    """Fork for each message on stdin; returns in the child, with the module and its arguments."""
     _load()
     server = socket.socket(fileno=os.dup(0))
     waiting = selectors.DefaultSelector()
     waiting.register(server, selectors.EVENT_READ)
+    server.send(b"!")
     while True:
         for key, _ in waiting.select():
             if key.data is not None:
-                pid, status = key.data
-                code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-                waiting.unregister(key.fd)
-                os.close(key.fd)
-                _tell(status, code)
-                os.close(status)
+                _reap(waiting, key)
                 continue
             told, files, *_ = socket.recv_fds(server, MOST_OCTETS, 4)
             if not told:
@@ -149,23 +142,38 @@ def serve() -> list[str]:
             *streams, status = files
             pid = os.fork()
             if not pid:
-                os.setsid()
-                for number, stream in enumerate(streams):
-                    os.dup2(stream, number)
                 waiting.close()
                 server.close()
-                os.closerange(3, MOST_FILES)
-                folder, environment, *arguments = json.loads(told)
-                os.environ.clear()
-                os.environ.update(environment)
-                tempfile.tempdir = None
-                os.chdir(folder)
-                sys.path[0] = folder
-                return arguments
+                return _become(told, streams)
             for stream in streams:
                 os.close(stream)
             _tell(status, pid)
             waiting.register(os.pidfd_open(pid), selectors.EVENT_READ, (pid, status))
+
+
+def _become(told: bytes, streams: list[int]) -> list[str]:
+    """Take what the message says in place of what was copied."""
+    os.setsid()
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
+    # What the origin holds of other copies.
+    os.closerange(3, MOST_FILES)
+    folder, environment, *command = json.loads(told)
+    os.environ.clear()
+    os.environ.update(environment)
+    os.chdir(folder)
+    sys.path[0] = folder
+    tempfile.tempdir = None
+    return command
+
+
+def _reap(waiting: selectors.BaseSelector, key: selectors.SelectorKey) -> None:
+    """Tell who waits how a copy has ended."""
+    pid, status = key.data
+    waiting.unregister(key.fd)
+    os.close(key.fd)
+    _tell(status, os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
+    os.close(status)
 
 
 def _tell(status: int, number: int) -> None:

@@ -34,15 +34,9 @@ class Daemon(Process):
     """
 
     def __init__(self, directory: Path, config: Path, log: Path, before: str = "") -> None:
-        arguments = ["--config", str(config)]
-        if before:
-            super().__init__(
-                [sys.executable, "-c", before + MAIN, *arguments], name="sdrlinkd", log=log
-            )
-        else:
-            super().__init__(
-                module("sdrlinkd", *arguments), name="sdrlinkd", log=log, popen=origin.popen
-            )
+        started = ["-c", before + MAIN] if before else ["-m", "sdrlinkd"]
+        command = [sys.executable, *started, "--config", config]
+        super().__init__(command, name="sdrlinkd", log=log, popen=None if before else origin.popen)
         self.directory = directory
         self.config = config
         self.expected_exit = 0

@@ -32,7 +32,7 @@ def test_it_ends_by_signals_and_with_its_parent(daemon, changes):
     watch = ("status", "--watch", "--runtime-dir", daemon.directory)
     with sdrlinkctl(*watch, environment=environment) as killed:
         wait_for(killed.out)
-        assert not changes or "tests.copied" not in command_line(killed)
+        assert ("tests.copied" in command_line(killed)) == (not changes)
         killed.kill()
         assert killed.code == -signal.SIGKILL
     with sdrlinkctl(*watch, environment=environment) as orphan:

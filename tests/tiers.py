@@ -259,7 +259,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark slow tests: a daemon takes a second to start, unless a test is marked as quick.
+    """Mark those as slow that start a daemon, unless they are marked as quick.
 
     Those for `make fresh` run only there. Those in real time come last; before them come files
     without slow tests, so that all workers have something to do until then.

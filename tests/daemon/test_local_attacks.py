@@ -3,8 +3,6 @@
 import os
 import signal
 import socket
-import subprocess
-import sys
 import time
 
 import pytest
@@ -16,7 +14,6 @@ from tests.programs import sdrlinkd
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
-MAIN = "import sys; from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1:]))"
 
 
 def test_a_message_of_256_mib_never_gets_into_memory(start_daemon):
@@ -53,12 +50,9 @@ def test_no_link_of_another_user_is_followed(write_config, tmp_path, what):
     conf.mkdir()
     path = write_config(conf)
     path.write_text(path.read_text().replace(f'"{conf}"', f'"{folder}"'))
-    done = subprocess.run(
-        [sys.executable, "-c", MAIN, "--config", str(path)], capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
-    assert done.returncode == 2
-    (line,) = done.stderr.splitlines()
+    with sdrlinkd("--config", path) as daemon:
+        assert daemon.wait() == 2
+    (line,) = daemon.err().splitlines()
     assert line.startswith("sdrlinkd: bus.runtime_dir:")
     if what == "lock":
         assert target.read_text() == "precious"
