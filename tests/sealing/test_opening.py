@@ -116,6 +116,9 @@ def test_a_disk_that_has_failed_stops_us_once_its_numbers_are_used():
     assert one.may_send(59.0, 0, 1)
     assert not one.may_send(60.0, 0, 1)
     assert one.halted.endswith("cannot be written to disk: No space left on device")
+    other = robot(2)
+    other.memory.not_written("No space left on device")
+    assert not other.may_send(60.0, 0, 1), "its first burst"
 
 
 def test_what_does_not_open_is_refused_by_name():
