@@ -25,14 +25,20 @@ SIZE, INNER = 78, 64
 DAY_S = 86_400
 
 
-def robot(own_id=1, keys=(KEY,), floor=0, **params):
+def made(own_id=1, keys=(KEY,), floor=0, **params):
+    """A robot of which the disk knows nothing new."""
     disk = Remembered({KEY.fingerprint: floor} if floor else {}, {}, KEY.fingerprint)
     params = SecurityParams(mode="seal", **params)
-    made = Sealing(own_id, SIZE, params, list(keys), disk, lambda n: bytes([own_id]) * n)
-    made.look(0.0)
-    made.memory.written(made.memory.wanted(0.0))
-    assert made.may_send(0.0, 0, 1), "its clock begins"
-    return made
+    new = Sealing(own_id, SIZE, params, list(keys), disk, lambda n: bytes([own_id]) * n)
+    new.look(0.0)
+    return new
+
+
+def robot(own_id=1, keys=(KEY,), floor=0, **params):
+    new = made(own_id, keys, floor, **params)
+    new.memory.written(new.memory.wanted(0.0))
+    assert new.may_send(0.0, 0, 1), "its clock begins"
+    return new
 
 
 def pdu(seq, *records, src=1, dst=255):
@@ -116,9 +122,10 @@ def test_a_disk_that_has_failed_stops_us_once_its_numbers_are_used():
     assert one.may_send(59.0, 0, 1)
     assert not one.may_send(60.0, 0, 1)
     assert one.halted.endswith("cannot be written to disk: No space left on device")
-    other = robot(2)
-    other.memory.not_written("No space left on device")
-    assert not other.may_send(60.0, 0, 1), "its first burst"
+    never = made(2)
+    never.memory.not_written("No space left on device")
+    assert not never.may_send(0.0, 0, 1), "nothing was ever written"
+    assert never.halted.endswith("No space left on device")
 
 
 def test_what_does_not_open_is_refused_by_name():
