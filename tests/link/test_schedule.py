@@ -50,7 +50,57 @@ def test_a_source_that_jitters_is_foreseen_within_its_jitter(seed):
     forecasts, due_at = learned(jitter_s=0.001, n=50, seed=seed)
     found = forecasts.next_due(due_at - 0.01, Qos.BULK)
     assert found.due(due_at - 0.01) == pytest.approx(due_at, abs=0.001), f"seed {seed}"
-    assert 0.0002 < found.jitter_s < 0.001
+    assert 0.0002 < found.line.jitter_s < 0.001
+
+
+@law(200)
+@given(
+    period_s=st.sampled_from([0.003, 0.02, 0.033, 1.0]),
+    before=st.integers(5, 40),
+    pause=st.one_of(st.floats(1, 10), st.floats(1, 10_000)),
+    jitter=st.floats(0, 0.1),
+    seed=st.integers(0, 2**32),
+)
+def test_after_any_pause_the_second_message_is_foreseen_and_all_after_it(
+    period_s, before, pause, jitter, seed
+):
+    rng, forecasts = Random(seed), Forecasts()
+
+    def note(due_at):
+        at = due_at + rng.uniform(-jitter, jitter) * period_s
+        forecasts.note("laser", Qos.LATENCY, at)
+
+    for i in range(before):
+        note(i * period_s)
+    again_at = (before - 1 + pause) * period_s
+    note(again_at)
+    for i in range(1, 30):
+        due_at = again_at + i * period_s
+        now = due_at - 0.4 * period_s
+        found = forecasts.next_due(now, Qos.BULK)
+        # A pause of less than half a period is hardly more than jitter.
+        off = 0.25 if pause < 1.5 else 3 * jitter + 0.01
+        assert abs(found.due(now) - due_at) <= off * period_s + 1e-4
+        note(due_at)
+
+
+@law(60)
+@given(
+    rate=st.sampled_from([0.1, 1 / 3, 0.5, 0.9, 1.1, 2.0, 3.0, 10.0]),
+    jitter=st.floats(0, 0.02),
+    seed=st.integers(0, 2**32),
+)
+def test_another_rate_is_learned_from_eight_messages_or_sixteen(rate, jitter, seed):
+    rng, forecasts, period_s = Random(seed), Forecasts(), PERIOD_S / rate
+    learned = 16 if 0.75 < rate < 1.25 else 8
+    for i in range(-30, 30):
+        at = i * (PERIOD_S if i < 0 else period_s)
+        shift = rng.uniform(-jitter, jitter) * min(PERIOD_S, period_s)
+        forecasts.note("laser", Qos.LATENCY, at + shift)
+        now = at + 0.6 * period_s
+        if i >= learned and period_s > 0.002:
+            found = forecasts.next_due(now, Qos.BULK)
+            assert found.due(now) == pytest.approx(at + period_s, abs=0.1 * period_s + 1e-4)
 
 
 def test_random_times_foretell_nothing_but_are_reckoned_with():
@@ -181,6 +231,10 @@ def test_an_urgent_message_never_waits_for_more_than_one_burst():
     link.submit(2, bytes(8), 0.0, Overrides(Qos.URGENT))
     for _ in range(400):
         burst = next_burst(link, now)
+        if burst is None:
+            # The air is kept free for a message that seems to be due.
+            now = link.next_wakeup(now)
+            continue
         end = burst.start + burst.airtime_s
         if rng.random() < 0.3:
             at = rng.uniform(now, end)

@@ -111,8 +111,11 @@ class Limits:
             if due is not None and n:
                 free_s = due.due(known) - due.spread_s + ready_s - start
                 n = self._before(free_s, 2 * due.spread_s + notice_s, n, airtime_s, overrun)
-                if n == 0 and until == inf:
-                    until = due.due(known) + due.spread_s + notice_s
+                passed_at = due.due(known) + due.spread_s + notice_s
+                if n == 0 and passed_at <= start:
+                    n = 1
+                elif n == 0 and until == inf:
+                    until = passed_at
             most.append(n)
         return Allowance(tuple(most), until=until)
 

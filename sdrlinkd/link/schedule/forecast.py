@@ -1,21 +1,31 @@
 """Forecasts when the next message of a periodic topic is due."""
 
-from dataclasses import dataclass
-from math import inf
+from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise, takewhile
+from math import inf, sqrt
 from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
 
 MEMORY = 16
-"""Effective number of messages that the estimate remembers."""
+"""Number of messages that a forecast is made from."""
 LEARNED = 3
 """Number of messages from which a period is trusted."""
-STEADY = 0.2
-"""Largest jitter of a periodic topic, as a share of its period."""
+STEADY = 0.18
+"""Largest mean distance of a periodic topic's steps from a number of periods, in periods."""
+NEAR = 0.25
+"""Distance of a step from the period, in periods, up to which it is one period long."""
+FEW = 7
+"""Number of the last messages that tell of a new rate, if their steps are more EVEN than STEADY."""
+EVEN = 0.05
+ODD = 6
+"""Distance of a step from the period after which the phase is another one, in the median
+distance."""
 FASTEST_S = 0.002
 """Shortest period in s for which airtime is kept free."""
 MISSED = 3
-"""Number of periods without a message after which a topic has ended."""
+"""Number of periods without a message after which a topic has ended, or paused."""
 MOST = 128
 """Largest number of topics that are tracked; the topics heard last are kept."""
 AT_LEAST_S = 1e-4
@@ -30,63 +40,70 @@ class Flow(NamedTuple):
     topic_id: int
 
 
-@dataclass(slots=True, eq=False)
-class Forecast:
-    """The period and phase of one topic: a line through its messages' times.
+class Line(NamedTuple):
+    """A line through a topic's messages: when the newest was due, period and jitter, in s."""
 
-    The line is tracked by a growing-memory α–β filter; `jitter_s` is the mean distance from it.
+    beat_at: float
+    period_s: float
+    jitter_s: float
+    is_periodic: bool
+
+
+class Forecast:
+    """The period and phase of one topic.
+
+    Both are computed from the last MEMORY messages alone: the period from the steps between them
+    that are about one period long, the phase from the messages since the last step that was not.
+    What misleads a forecast is soon gone: a pause with the first message after it, lost and late
+    messages at once, another rate with half of MEMORY, or all
+    of it if it differs by less than NEAR.
     """
 
-    qos: Qos
-    seen_at: float
-    n_pdus: int = 1
-    """PDUs that the last message needed."""
-    n: int = 1
-    beat_at: float = 0.0
-    period_s: float = 0.0
-    jitter_s: float = 0.0
+    __slots__ = ("_line", "_times", "n_pdus", "qos")
+
+    def __init__(self, qos: Qos, at: float, n_pdus: int = 1) -> None:
+        self.qos = qos
+        self.n_pdus = n_pdus
+        """PDUs that the last message needed."""
+        self._times = deque([at], MEMORY)
+        self._line: Line | None = None
 
     def note(self, qos: Qos, at: float) -> None:
-        """Update the line with a message of class `qos` that came at `at`."""
+        """Take a message of class `qos` that came at `at`, after all before."""
         self.qos = qos
-        step_s, self.seen_at = at - self.seen_at, at
-        if self.n == 1 or step_s <= 0 or step_s > 2 * MISSED * max(self.period_s, FASTEST_S):
-            # Start over on the second message, two messages at once, or a long pause.
-            self.n, self.beat_at, self.jitter_s = (2 if step_s > 0 else 1), at, 0.0
-            self.period_s = step_s if self.n == 2 else 0.0
-            return
-        beats = max(1, round((at - self.beat_at) / self.period_s))
-        error_s = at - (self.beat_at + beats * self.period_s)
-        self.n = min(self.n + 1, MEMORY)
-        n = self.n
-        self.beat_at += beats * self.period_s + error_s * (4 * n - 2) / (n * (n + 1))
-        self.period_s += 6 / (n * (n + 1)) * error_s / beats
-        self.jitter_s += (abs(error_s) - self.jitter_s) / n
-        if self.period_s < FASTEST_S / 2:
-            self.n = 1
+        self._times.append(at)
+        self._line = None
+
+    @property
+    def seen_at(self) -> float:
+        """When the last message came."""
+        return self._times[-1]
+
+    @property
+    def line(self) -> Line:
+        """The line through the last messages."""
+        if self._line is None:
+            self._line = _line_through([*self._times])
+        return self._line
 
     @property
     def is_periodic(self) -> bool:
         """Whether the time of the next message can be predicted."""
-        return (
-            self.n >= LEARNED
-            and self.period_s >= FASTEST_S
-            and self.jitter_s <= STEADY * self.period_s
-        )
+        return self.line.is_periodic
 
     def is_alive(self, now: float) -> bool:
         """Whether more messages of the topic are expected."""
-        return now - self.seen_at <= MISSED * self.period_s
+        return now - self.seen_at <= MISSED * self.line.period_s
 
     @property
     def spread_s(self) -> float:
         """Time in s by which a message may come before or after its predicted time."""
-        return self.jitter_s + AT_LEAST_S
+        return self.line.jitter_s + AT_LEAST_S
 
     def is_late(self, now: float) -> bool:
         """Whether a message is overdue, so that it may come at any time."""
-        over_s = now - self.beat_at - self.period_s
-        return self.spread_s < over_s < self.period_s / 2
+        line = self.line
+        return self.spread_s < now - line.beat_at - line.period_s < line.period_s / 2
 
     def is_due(self, begin: float, end: float) -> bool:
         """Whether the next message is urgent, and predicted between two times."""
@@ -99,10 +116,54 @@ class Forecast:
 
     def due(self, now: float) -> float:
         """Predicted time of the next message; a late one is still expected for `spread_s`."""
-        next_at = self.beat_at + self.period_s
-        while next_at + self.spread_s < now:
-            next_at += self.period_s
+        line, spread_s = self.line, self.spread_s
+        next_at = line.beat_at + line.period_s
+        while next_at + spread_s < now:
+            next_at += line.period_s
         return next_at
+
+
+def _line_through(times: Sequence[float]) -> Line:
+    """The line through messages that came at `times`, in s, in ascending order."""
+    line = _fitted(times, STEADY)
+    return line if line.is_periodic else _fitted(times[-FEW:], EVEN)
+
+
+def _fitted(times: Sequence[float], most: float) -> Line:
+    """The line through `times`, periodic if its steps are off by `most` periods or less."""
+    steps = [after - before for before, after in pairwise(times)]
+    if not steps:
+        return Line(times[-1], 0.0, 0.0, is_periodic=False)
+    period_s = _median(steps)
+    near = [step_s for step_s in steps if abs(step_s - period_s) <= NEAR * period_s]
+    distance_s = _median([abs(step_s - period_s) for step_s in near])
+    odd_s = min(NEAR * period_s, ODD * distance_s + AT_LEAST_S)
+    single = [step_s for step_s in near if abs(step_s - period_s) <= odd_s]
+    period_s = sum(single) / len(single)
+    # Longer steps are pauses, which say nothing.
+    off = [
+        abs(step_s - max(1, round(step_s / period_s)) * period_s)
+        for step_s in steps
+        if step_s < (MISSED + 0.5) * period_s
+    ]
+    off_s = sum(off) / len(off)
+    is_periodic = (
+        len(times) >= LEARNED
+        and 2 * len(near) >= len(steps)
+        and FASTEST_S <= period_s
+        and off_s <= most * period_s
+    )
+    n = 1 + sum(1 for _ in takewhile(lambda step_s: abs(step_s - period_s) <= odd_s, steps[::-1]))
+    in_phase, middle = times[-n:], (n - 1) / 2
+    if n > LEARNED:
+        # Least squares.
+        period_s = 12 * sum((i - middle) * at for i, at in enumerate(in_phase)) / (n**3 - n)
+    # A step jitters at both ends.
+    return Line(sum(in_phase) / n + middle * period_s, period_s, off_s / sqrt(2), is_periodic)
+
+
+def _median(values: Sequence[float]) -> float:
+    return sorted(values)[(len(values) - 1) // 2]
 
 
 class Forecasts:
