@@ -150,7 +150,7 @@ def _fitted(times: Sequence[float], most: float) -> Line:
     is_periodic = (
         len(times) >= LEARNED
         and 2 * len(near) >= len(steps)
-        and FASTEST_S <= period_s
+        and period_s >= FASTEST_S
         and off_s <= most * period_s
     )
     n = 1 + sum(1 for _ in takewhile(lambda step_s: abs(step_s - period_s) <= odd_s, steps[::-1]))
