@@ -145,7 +145,7 @@ class Link:
         self._rng = rng
         self._classes = classes
         digest = registry.digest({i: each.dict_id() for i, each in dictionaries.items()})
-        self._outbox = Outbox(queue)
+        self._outbox = Outbox(queue, params.pdu_size)
         room = equal_payload(params.pdu_size, 1)
         record = min(room, TLV_HEADER_SIZE + MAX_VALUE_SIZE)
         piece = record - TOPIC_OVERHEAD

@@ -42,7 +42,8 @@ def walk(outbox):
 @given(st.integers(0, 2**32))
 def test_bursts_are_as_long_as_allowed_and_of_one_source(seed):
     rng = Random(seed)
-    registry, outbox = make_registry(TOPICS), Outbox(QueueParams(max_messages=rng.randrange(1, 40)))
+    registry = make_registry(TOPICS)
+    outbox = Outbox(QueueParams(max_messages=rng.randrange(1, 40)), 64)
     params = LinkParams(pdu_size=PDU_SIZE, greedy=rng.random() < 0.5)
     intake = Intake(params, OwnTopics(registry, False, 100), outbox, CLASSES, {})
     composer = Composer(params, 1, outbox, PiggybackRecords(), rng, 0.5, True, CLASSES)

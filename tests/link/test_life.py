@@ -58,7 +58,7 @@ def test_nothing_leaves_an_end():
 def test_in_the_field_an_illegal_step_is_counted_told_and_changes_nothing(monkeypatch):
     monkeypatch.setattr(Lives, "is_strict", False)
     registry = make_registry([("odom", "nav_msgs/msg/Odometry")])
-    outbox = Outbox(QueueParams())
+    outbox = Outbox(QueueParams(), 64)
     intake = Intake(LinkParams(), OwnTopics(registry, False, 100), outbox, ClassesParams(), {})
     assert intake.audit() == []
     made = message([Step.DROP])
@@ -68,7 +68,7 @@ def test_in_the_field_an_illegal_step_is_counted_told_and_changes_nothing(monkey
 
 
 def test_a_queue_says_why_it_takes_a_message_or_not():
-    outbox = Outbox(QueueParams(max_messages=1))
+    outbox = Outbox(QueueParams(max_messages=1), 64)
     first, second = message(), message()
     assert outbox.put(first, DEFAULT_POLICY, inf) is None
     assert outbox.put(second, DEFAULT_POLICY, inf) is None

@@ -217,7 +217,8 @@ class Model:
         assert (head.qos, -head.priority) == first
         assert head in heads.values()
         equals = [each for each in heads.values() if (each.qos, -each.priority) == first]
-        assert head.expires_at <= min(each.expires_at for each in equals)
+        spent = [each.lane.account.spent for each in equals]
+        assert head.lane.account.spent == min(spent)
         keys = [level.key for level in outbox.levels]
         assert keys == sorted({(each.qos, -each.priority) for each in both})
         return head
@@ -246,7 +247,7 @@ steps = st.lists(
 @law(120)
 @given(steps)
 def test_the_queue_is_as_its_plainest_form(steps):
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     model = Model(outbox)
     for now, step in enumerate(steps):
         head = model.check()
@@ -264,7 +265,7 @@ def test_the_queue_is_as_its_plainest_form(steps):
             if head.next_index == head.total:
                 outbox.end(head.lane)
                 model.begun.remove(head)
-            outbox.served(head.lane)
+            outbox.served(head.lane, 15)
         else:
             outbox.begin(head.lane, 1, 15, max(1, -(-len(head.payload) // 15)), now)
             model.waiting.remove(head)
@@ -277,7 +278,7 @@ def test_the_queue_is_as_its_plainest_form(steps):
 
 
 def test_equal_lanes_take_turns_and_the_earliest_expiry_comes_first():
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     for topic_id, until in ((0, inf), (1, inf), (2, inf), (0, inf), (1, inf), (2, 5.0), (3, 4.0)):
         outbox.put(outgoing(topic_id=topic_id, until=until), DEFAULT_POLICY, inf)
     served = []
@@ -301,7 +302,7 @@ def relayed(src=9, qos=Qos.DEFAULT):
 
 
 def test_the_source_of_the_next_pdu_is_that_of_the_next_message():
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     assert outbox.next_relayed() is None
     outbox.put(outgoing(qos=Qos.BULK), DEFAULT_POLICY, inf)
     assert not outbox.relays
@@ -316,7 +317,7 @@ def test_the_source_of_the_next_pdu_is_that_of_the_next_message():
 
 def put_all(limits, policy, *messages, bytes_per_s=inf):
     """What becomes of messages that are put one after the other, by reason."""
-    outbox = Outbox(QueueParams(**{"max_messages": 100, "max_bytes": 10_000, **limits}))
+    outbox = Outbox(QueueParams(**{"max_messages": 100, "max_bytes": 10_000, **limits}), 64)
     told = [outbox.put(each, policy, bytes_per_s) for each in messages]
     dropped = {i: reason for i, each in enumerate(messages) for reason in each.tally.dropped}
     assert [told[i] for i in range(len(told))] == [
@@ -382,7 +383,7 @@ def test_depth_and_limits_hold_for_each_key_and_topic():
 
 
 def test_a_message_counts_as_sent_when_all_its_pdus_have_left():
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     lives, made = outbox.lives, outgoing(20, receipt="a.1")
     outbox.put(made, DEFAULT_POLICY, inf)
     outbox.begin(made.lane, 1, 10, 2, 0.0)
@@ -403,7 +404,7 @@ def test_a_message_counts_as_sent_when_all_its_pdus_have_left():
 
 
 def test_a_burst_that_failed_drops_what_it_carried_and_tells_what_has_more_to_send():
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     done, more = (outgoing(20, topic_id=i, receipt="r" * i) for i in range(2))
     for made in (done, more):
         outbox.put(made, DEFAULT_POLICY, inf)
@@ -489,7 +490,7 @@ REGISTRY = make_registry([("odom", "nav_msgs/Odometry"), ("scan", "sensor_msgs/L
 
 def intake(has_numbers=True, classes=None, outbox=None, **more):
     if outbox is None:
-        outbox = Outbox(PLENTY)
+        outbox = Outbox(PLENTY, 64)
     topics = OwnTopics(REGISTRY, has_numbers, 100)
     params = LinkParams(pdu_size=64)
     return Intake(params, topics, outbox, classes or ClassesParams(), {}, 65_535, **more)
@@ -503,7 +504,7 @@ def next_of(made, outbox, *args, **more):
 
 
 def test_a_message_is_treated_as_its_producer_wishes_and_else_as_its_topic():
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     made = intake(outbox=outbox)
     made.set_policy(0, TopicPolicy(qos="urgent", priority=9, dst=3, lifespan_s=4.0, stamp=False))
     head = next_of(made, outbox, 0, b"data", 1.0)
@@ -534,7 +535,7 @@ def test_a_message_whose_lifespan_is_over_is_not_queued():
     [(10.0, None, 90.0), (10.1, None, 100.0), (10.1, 60.0, 89.9), (10.1, inf, 100.0)],
 )
 def test_an_age_that_is_unlikely_counts_from_now(age_s, lifespan_s, arrived_at):
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     wishes = Overrides(age_s=age_s, lifespan_s=lifespan_s)
     head = next_of(intake(outbox=outbox), outbox, 0, b"data", 100.0, wishes)
     assert head.arrived_at == arrived_at
@@ -542,7 +543,7 @@ def test_an_age_that_is_unlikely_counts_from_now(age_s, lifespan_s, arrived_at):
 
 def test_large_messages_are_parted_evenly_with_the_parity_of_their_class():
     for share, has_numbers in ((0.0, True), (0.5, True), (0.0, False)):
-        outbox = Outbox(PLENTY)
+        outbox = Outbox(PLENTY, 64)
         made = intake(has_numbers, ClassesParams(default=DefaultParams(parity=share)), outbox)
         most = 255 * 51
         assert next_of(made, outbox, 0, bytes(most), 0.0).channel == 0
@@ -572,7 +573,7 @@ def test_large_messages_are_parted_evenly_with_the_parity_of_their_class():
 def test_what_receivers_would_not_expand_is_sent_as_it_is(
     size, max_bytes, is_sealed, is_compressed
 ):
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     made = intake(outbox=outbox, is_sealed=is_sealed)
     made.set_policy(0, TopicPolicy(compress="zstd", max_bytes=max_bytes))
     head = next_of(made, outbox, 0, bytes(size), 0.0)
@@ -581,7 +582,7 @@ def test_what_receivers_would_not_expand_is_sent_as_it_is(
 
 
 def test_latched_messages_are_queued_again_while_they_live():
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     made = intake(outbox=outbox)
     kept = Kept(b"data", 1.0, Overrides(lifespan_s=5.0, dst=7))
     made.offer_again(Offer(0, kept, 9), 6.0, inf)
@@ -597,7 +598,7 @@ def test_latched_messages_are_queued_again_while_they_live():
 
 
 def test_relayed_pdus_have_the_priority_of_their_most_urgent_topic():
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     made = intake(outbox=outbox)
     made.set_policy(1, TopicPolicy(priority=99))
     for topics, priority in (
@@ -618,7 +619,7 @@ def test_relayed_pdus_have_the_priority_of_their_most_urgent_topic():
 
 
 def test_what_was_taken_and_refused_is_counted_and_reported():
-    outbox = Outbox(PLENTY)
+    outbox = Outbox(PLENTY, 64)
     made = intake(outbox=outbox)
     made.set_policy(0, TopicPolicy(max_bytes=10, lifespan_s=9.0))
     assert made.submit(0, bytes(11), 0.0) == "tx_size_cap"

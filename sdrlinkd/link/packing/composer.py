@@ -235,6 +235,10 @@ class Composer:
             self._piggyback.ride(draft, start, self.next_number)
         if self._bare.untold:
             self._bare.ride(draft, self.next_number)
+        if draft.room > 0 and draft.carried:
+            # What the PDU leaves unused is air, too.
+            for message in draft.carried:
+                outbox.charge(message, draft.room / len(draft.carried))
         return self._finish(draft, self.next_number)
 
     def _next_full(self, start: float, most: int, source: int | None) -> list[BuiltPdu]:
@@ -283,14 +287,22 @@ class Composer:
         return BuiltPdu(data, draft.carried, draft.qos)
 
     def _fill_from(self, level: Level, draft: Draft, start: float) -> None:
-        lanes = tuple(level.lanes)
-        more = True
-        while more:
-            more = False
-            for lane in lanes:
-                head = self._live(lane, start)
-                if head is None or head.is_whole or not draft.suits(head):
-                    continue
-                if self._writer.place(lane, head, level, draft, start):
-                    more = self._is_greedy
-            more = more and bool(level.lanes) and self._writer.may_fit(level, draft.room)
+        """Add entries of a level's topics, the one that has sent least first, while they fit."""
+        given: set[Lane] = set()
+        i = 0
+        while i < len(level.lanes) and i <= MAX_LANES_PER_PDU and draft.room > 0:
+            lane = level.lanes[i]
+            head = self._live(lane, start)
+            if head is None:
+                continue
+            is_due = self._is_greedy or lane not in given
+            if (
+                is_due
+                and draft.suits(head)
+                and not head.is_whole
+                and self._writer.place(lane, head, level, draft, start)
+            ):
+                # The lane is behind all that have sent less, so that another one is here now.
+                given.add(lane)
+            else:
+                i += 1

@@ -136,12 +136,12 @@ class EntryWriter:
             if self._parity[head.qos] or head.channel == PARTS:
                 head.follow_with(self._parity_of(head))
             self._end(lane, head, start)
-        self._outbox.served(lane)
+        self._outbox.served(lane, length + beside)
         return True
 
     def _place_parity(self, lane: Lane, head: Outgoing, draft: Draft, start: float) -> bool:
         """Add parity of `head`, whose fragments have all been composed, to the draft if it fits."""
-        records = head.parity
+        records, room = head.parity, draft.room
         if head in draft.carried:
             # Loss of one PDU must not take both a fragment and its parity.
             return False
@@ -156,7 +156,7 @@ class EntryWriter:
         draft.join(head)
         head.ride()
         self._end(lane, head, start)
-        self._outbox.served(lane)
+        self._outbox.served(lane, room - draft.room)
         return True
 
     def _end(self, lane: Lane, head: Outgoing, start: float) -> None:

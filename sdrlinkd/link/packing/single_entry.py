@@ -23,7 +23,7 @@ class SingleEntry:
         self._outbox.begin(lane, 0, 0, 1, start)
         head.advance(1, start)
         self._outbox.end(lane)
-        self._outbox.served(lane)
+        self._outbox.served(lane, len(head.payload))
         return BuiltPdu(self.forwarded(head.payload, start - head.arrived_at), [head], head.qos)
 
     def forwarded(self, pdu: bytes, held_s: float) -> bytes:
@@ -63,5 +63,5 @@ class SingleEntry:
             for i, at in enumerate(range(first * k, (first + n) * k, k))
         ]  # fmt: skip
         head.advance(n, start)
-        self._outbox.served(lane)
+        self._outbox.served(lane, n * (k + head.overhead))
         return built

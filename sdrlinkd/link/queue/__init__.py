@@ -6,6 +6,7 @@ PDUs and knows nothing of radio or channel.
 
 from sdrlinkd.link.queue.admission import NOT_TAKEN
 from sdrlinkd.link.queue.compression import Deflated, Inflated, most_expanded, train_dictionary
+from sdrlinkd.link.queue.fair import Level, with_first
 from sdrlinkd.link.queue.fate import STEPS, Fate, Step
 from sdrlinkd.link.queue.intake import Intake
 from sdrlinkd.link.queue.latched import Kept, Latched, Offer
@@ -19,7 +20,7 @@ from sdrlinkd.link.queue.ledger import (
 )
 from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
 from sdrlinkd.link.queue.lives import Lives
-from sdrlinkd.link.queue.message import Lane, Level, Outgoing, with_first
+from sdrlinkd.link.queue.message import Lane, Outgoing
 from sdrlinkd.link.queue.outbox import Outbox
 from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
 

@@ -5,8 +5,8 @@ Lanes of equal class and priority form a *level*.
 """
 
 from collections import OrderedDict, deque
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import inf
 
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue.fate import STEPS, Fate, Step
@@ -216,18 +216,37 @@ class Outgoing:
             self.next_index = self.total = 0
 
 
+class Account:
+    """What one topic has sent at one class and priority, in octets divided by its weight."""
+
+    __slots__ = ("lanes", "spent", "topic_id", "weight")
+
+    def __init__(self, topic_id: int) -> None:
+        self.topic_id = topic_id
+        self.weight = 1.0
+        self.spent = -inf
+        self.lanes: list[Lane] = []
+        """The topic's lanes that have something to send."""
+
+
 class Lane:
     """One topic at one class, priority and destination."""
 
-    __slots__ = ("current", "dst", "level", "order", "topic_id", "waiting")
+    __slots__ = ("account", "current", "dst", "level_key", "order", "waiting")
 
-    def __init__(self, topic_id: int, dst: int, level: "Level") -> None:
-        self.topic_id = topic_id
+    def __init__(self, account: Account, dst: int, level_key: tuple[int, int]) -> None:
+        self.account = account
         self.dst = dst
-        self.level = level
+        self.level_key = level_key
+        """Class, and priority with its sign changed."""
         self.current: Outgoing | None = None
         self.waiting: deque[Outgoing] = deque()
-        self.order: tuple[float, int] = (0.0, 0)
+        self.order: tuple[float, float, int] = (0.0, 0.0, 0)
+
+    @property
+    def topic_id(self) -> int:
+        """The topic of its messages."""
+        return self.account.topic_id
 
     @property
     def head(self) -> Outgoing | None:
@@ -269,20 +288,3 @@ class QueuedOfTopic:
         if not of_key:
             del self.by_key[message.key]
         self.n_bytes -= len(message.payload)
-
-
-class Level:
-    """The non-empty lanes of one class and priority, in service order."""
-
-    __slots__ = ("key", "lanes", "per_dst", "qos")
-
-    def __init__(self, key: tuple[int, int]) -> None:
-        self.key = key
-        self.qos = Qos(key[0])
-        self.lanes: list[Lane] = []
-        self.per_dst: dict[int, int] = {}
-
-
-def with_first(levels: Sequence[Level], first: Qos) -> list[Level]:
-    """The levels in service order, except that those of class `first` come first."""
-    return sorted(levels, key=lambda level: (level.qos is not first, level.key))

@@ -1,7 +1,7 @@
 """The queue of messages to be sent, and their order.
 
-Levels are served in order. Within a level, the earliest expiry comes first, and lanes with equal
-expiry are served round robin: a lane that gave an entry goes to the back.
+Levels are served in order. Within a level, topics share the airtime fairly (see `fair`); within a
+topic, messages are sent in the order in which they came.
 """
 
 from bisect import bisect_left, insort
@@ -11,8 +11,9 @@ from math import inf
 
 from sdrlinkd.link.params import QueueParams
 from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.queue.fair import Level
 from sdrlinkd.link.queue.lives import Lives
-from sdrlinkd.link.queue.message import Lane, Level, Outgoing, QueuedOfTopic
+from sdrlinkd.link.queue.message import Lane, Outgoing, QueuedOfTopic
 from sdrlinkd.link.queue.policy import TopicPolicy
 from sdrlinkd.wire import ENTRY_HEADER_SIZE, STAMP_SIZE
 
@@ -20,15 +21,15 @@ MESSAGE_OVERHEAD = ENTRY_HEADER_SIZE + STAMP_SIZE
 """Bytes that a message takes in addition, as the last or only entry of a PDU that it shares."""
 
 
-def _order(lane: Lane) -> tuple[float, int]:
-    return lane.order
-
-
 class Outbox:
-    """The queue of one node. The cost of an operation does not depend on the queue's length."""
+    """The queue of one node, which sends PDUs of `pdu_size` bytes.
 
-    def __init__(self, limits: QueueParams) -> None:
+    The cost of an operation does not depend on the queue's length.
+    """
+
+    def __init__(self, limits: QueueParams, pdu_size: int) -> None:
         self._limits = limits
+        self._pdu_size = pdu_size
         self._lanes: dict[tuple[int, int, int, int], Lane] = {}
         # Non-empty levels in service order.
         self.levels: list[Level] = []
@@ -36,7 +37,6 @@ class Outbox:
         self._by_class: dict[Qos, OrderedDict[Outgoing, None]] = {q: OrderedDict() for q in Qos}
         self._class_bytes = dict.fromkeys(Qos, 0)
         self._by_topic: dict[int, QueuedOfTopic] = {}
-        self._turn = 0
         self.queued = 0
         self.queued_bytes = 0
         self._with_lifespan = 0
@@ -68,7 +68,7 @@ class Outbox:
         while self.queued >= limits.max_messages or self.queued_bytes + size > most:
             victim = self._oldest_of_lowest_class()
             self.lives.drop(self._withdraw_waiting(victim), "tx_overflow_old")
-        self._enqueue(message)
+        self._enqueue(message, policy.weight)
         return None
 
     def begin(self, lane: Lane, entry_id: int, k: int, total: int, start: float) -> None:
@@ -100,19 +100,18 @@ class Outbox:
         head = None if level is None else level.lanes[0].head
         return head.src if head is not None and head.is_whole else None
 
-    def served(self, lane: Lane) -> None:
-        """Move a lane that gave an entry behind its equals, or remove it if it is empty."""
-        head = lane.current or (lane.waiting[0] if lane.waiting else None)
-        if head is None:
-            self._unlink(lane)
-            del self._lanes[*lane.level.key, lane.topic_id, lane.dst]
-            return
-        level = lane.level
-        if len(level.lanes) == 1:
-            lane.order = (head.expires_at, self._next_turn())
-            return
-        self._unlink(lane)
-        self._link(lane, head)
+    def served(self, lane: Lane, octets: int) -> None:
+        """Charge a lane's topic for an entry that it gave, and remove the lane if it is empty."""
+        level = self._level_by_key[lane.level_key]
+        if lane.head is None:
+            self._follow_up(lane, level)
+        level.charge(lane.account, octets)
+
+    def charge(self, message: Outgoing, octets: float) -> None:
+        """Charge the topic of `message` for octets that do not come from the queue."""
+        level = self._level_by_key.get(message.lane.level_key)
+        if level is not None:
+            level.charge(message.lane.account, octets)
 
     def withdraw_head(self, lane: Lane) -> Outgoing:
         """Remove the lane's head, with all its fragments, and return it."""
@@ -121,7 +120,7 @@ class Outbox:
         else:
             message = lane.waiting.popleft()
             self._forget_queued(message)
-        self.served(lane)
+        self._follow_up(lane, self._level_by_key[lane.level_key])
         return message
 
     def next_class(self) -> Qos | None:
@@ -210,15 +209,18 @@ class Outbox:
                 if lane.current is not None:
                     yield lane.current
 
-    def _enqueue(self, message: Outgoing) -> None:
+    def _enqueue(self, message: Outgoing, weight: float) -> None:
         key = (message.qos, -message.priority, message.topic_id, message.dst)
         lane = self._lanes.get(key)
         if lane is None:
-            lane = self._lanes[key] = Lane(message.topic_id, message.dst, self._level(key[:2]))
+            level = self._level(key[:2])
+            lane = self._lanes[key] = level.lane(message.topic_id, message.dst)
             lane.waiting.append(message)
-            self._link(lane, message)
+            lane.account.weight = weight
+            level.add(lane, message)
         else:
             lane.waiting.append(message)
+            lane.account.weight = weight
         message.enter(lane)
         self.relays = self.relays or message.is_whole
         self._by_class[message.qos][message] = None
@@ -234,24 +236,17 @@ class Outbox:
     def _level(self, key: tuple[int, int]) -> Level:
         level = self._level_by_key.get(key)
         if level is None:
-            level = self._level_by_key[key] = Level(key)
+            level = self._level_by_key[key] = Level(key, self._pdu_size)
             insort(self.levels, level, key=lambda each: each.key)
         return level
 
-    def _link(self, lane: Lane, head: Outgoing) -> None:
-        level = self._level(lane.level.key)
-        lane.level = level
-        lane.order = (head.expires_at, self._next_turn())
-        insort(level.lanes, lane, key=_order)
-        level.per_dst[lane.dst] = level.per_dst.get(lane.dst, 0) + 1
-
-    def _unlink(self, lane: Lane) -> None:
-        level = lane.level
-        alone = len(level.lanes) == 1
-        del level.lanes[0 if alone else bisect_left(level.lanes, lane.order, key=_order)]
-        level.per_dst[lane.dst] -= 1
-        if not level.per_dst[lane.dst]:
-            del level.per_dst[lane.dst]
+    def _follow_up(self, lane: Lane, level: Level) -> None:
+        """Put a lane in the place of its next message, or remove it if there is none."""
+        if lane.head is not None:
+            level.move(lane)
+            return
+        level.remove(lane)
+        del self._lanes[*lane.level_key, lane.topic_id, lane.dst]
         if not level.lanes:
             del self._level_by_key[level.key]
             del self.levels[bisect_left(self.levels, level.key, key=lambda each: each.key)]
@@ -282,7 +277,7 @@ class Outbox:
         lane.waiting.popleft()
         self._forget_queued(message)
         if lane.current is None:
-            self.served(lane)
+            self._follow_up(lane, self._level_by_key[lane.level_key])
         return message
 
     def _forget_queued(self, message: Outgoing) -> None:
@@ -292,7 +287,3 @@ class Outbox:
         self._with_lifespan -= message.expires_at < inf
         self.queued_bytes -= len(message.payload)
         self._class_bytes[message.qos] -= len(message.payload)
-
-    def _next_turn(self) -> int:
-        self._turn += 1
-        return self._turn

@@ -27,6 +27,9 @@ class TopicPolicy(
     """Class of the messages, unless the producer names one."""
     priority: Annotated[int, Meta(ge=0, le=MAX_PRIORITY)] = MIDDLE_PRIORITY
     """Priority within the class, 0 to 127; 127 is the most urgent."""
+    weight: Annotated[float, Meta(ge=0.01, le=100)] = 1.0
+    """Share of the airtime that the topic gets, in proportion to those of other topics of equal
+    class and priority that have something to send at the same time."""
     history: Literal["keep_last", "keep_all"] = "keep_last"
     """Queue history: keep_last keeps the last `depth` messages, keep_all ignores `depth`."""
     depth: Amount = 0
