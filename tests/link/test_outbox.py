@@ -100,9 +100,26 @@ def test_a_long_lifespan_bears_a_great_age():
     assert [each.age_us for each in records_in(pdu, 64)] == [12_000_000]
 
 
-def test_the_rest_of_an_expired_message_is_withdrawn():
+def test_what_has_begun_is_finished_whatever_its_lifespan():
     link = make_link(pdu_size=64)
-    link.submit(0, bytes(200), 0.0, Overrides(lifespan_s=1.0))
+    for _ in range(2):
+        link.submit(0, bytes(200), 0.0, Overrides(lifespan_s=0.4))
+    begun = compose(link, 0.3, 2)
+    rest = send_all(link, now=0.7)
+    link.confirm(begun, Outcome.SENT, 0.8)
+    assert len(begun.pdus) + len(rest) == 5
+    assert topic_of(link, 0).sent == 1
+    assert dropped(link) == {("odom", "tx_expired"): 1}
+    assert link.audit() == []
+
+
+@pytest.mark.parametrize(
+    ("policy", "qos"), [(TopicPolicy(deadman_s=1.0), None), (TopicPolicy(), Qos.URGENT)]
+)
+def test_the_rest_of_an_expired_command_is_withdrawn(policy, qos):
+    link = make_link(pdu_size=64)
+    link.set_policies({0: policy})
+    link.submit(0, bytes(200), 0.0, Overrides(qos, lifespan_s=1.0))
     burst = compose(link, 0.5, 2)
     assert compose(link, 1.5, 8) is None
     assert link.audit() == []

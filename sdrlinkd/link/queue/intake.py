@@ -274,6 +274,7 @@ class Intake:
             key=key,
             number=number,
             parting=parting,
+            is_command=qos is Qos.URGENT or topic.policy.deadman_s > 0,
             is_compressed=frame is not None,
         )
         if message.expires_at <= now:

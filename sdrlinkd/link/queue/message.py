@@ -20,8 +20,8 @@ class Outgoing:
 
     __slots__ = (
         "_parting", "arrived_at", "body", "channel", "dst", "entry_id", "expires_at", "fate",
-        "held_ids", "ids", "is_bare", "is_compressed", "is_expected", "is_whole", "k", "key",
-        "lane", "last_at", "n_repeats", "next_index", "overhead", "parity", "parts_left",
+        "held_ids", "ids", "is_bare", "is_command", "is_compressed", "is_expected", "is_whole", "k",
+        "key", "lane", "last_at", "n_repeats", "next_index", "overhead", "parity", "parts_left",
         "payload", "pdu_number", "priority", "qos", "receipt", "rests_id", "stamped", "tally",
         "topic_id", "total", "unconfirmed",
     )  # fmt: skip
@@ -42,6 +42,7 @@ class Outgoing:
         key: str = "",
         number: int | None = None,
         parting: Parting | None = None,
+        is_command: bool = False,
         is_compressed: bool = False,
         is_whole: bool = False,
         pdu_number: int | None = None,
@@ -51,7 +52,8 @@ class Outgoing:
 
         `receipt` is the producer's id for the receipt, empty if none is wanted, and `key` its
         producer key. `number` is the topic's number on the air if that is not `topic_id`. `parting`
-        says how to divide a large message, whose parts are cut one after the other. `is_whole`
+        says how to divide a large message, whose parts are cut one after the other. `is_command`
+        means that its lifespan ends even if it has begun. `is_whole`
         means that the payload is another robot's PDU to be relayed, with `pdu_number` if known;
         `is_bare`, that this PDU holds only control records.
         """
@@ -67,6 +69,7 @@ class Outgoing:
         self.tally = tally
         self.receipt = receipt
         self.key = key
+        self.is_command = is_command
         self.is_compressed = is_compressed
         self.is_whole = is_whole
         self.pdu_number = pdu_number
@@ -128,6 +131,15 @@ class Outgoing:
         """Octets of the present body that are in no PDU yet."""
         return max(0, len(self.body) - self.next_index * self.k)
 
+    @property
+    def worth_until(self) -> float:
+        """When it is no longer worth sending.
+
+        A lifespan decides whether sending begins: what has begun is finished, except a command. A
+        message that needs more airtime than its lifespan would never arrive otherwise.
+        """
+        return inf if self.rests_id and not self.is_command else self.expires_at
+
     def in_vain(self, now: float, patience_s: float) -> str:
         """The ledger's reason to stop sending the message; empty while it is worth sending.
 
@@ -136,7 +148,7 @@ class Outgoing:
         """
         if self.parity:
             return ""
-        if self.expires_at <= now:
+        if self.worth_until <= now:
             return "tx_expired"
         return "tx_stalled" if self.k and now > self.last_at + patience_s else ""
 

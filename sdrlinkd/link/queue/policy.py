@@ -89,6 +89,11 @@ class TopicPolicy(
         return self.depth if self.history == "keep_last" else 0
 
     @property
+    def is_command(self) -> bool:
+        """Whether its messages are commands, whose lifespan ends even if they have begun."""
+        return self.qos == "urgent" or self.deadman_s > 0
+
+    @property
     def drops_late(self) -> bool:
         """Whether a message that comes after a newer one of its source is dropped."""
         return self.late == "drop" or self.deadman_s > 0

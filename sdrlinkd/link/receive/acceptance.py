@@ -92,11 +92,13 @@ class Acceptance:
         payload: bytes,
         is_compressed: bool,
         origin_at: float | None,
+        took_s: float,
         now: float,
     ) -> tuple[bytes, str | None]:
         """(the message as submitted, the ledger's reason for dropping it or None).
 
-        `origin_at` is when the message was submitted, None if no STAMP came.
+        `origin_at` is when the message was submitted, None if no STAMP came. It was `took_s` on
+        the air, which do not count unless it is a command.
         """
         policy, reason = self.policy_of(topic), None
         if is_compressed:
@@ -105,7 +107,8 @@ class Acceptance:
                 most = min(most, most_expanded(len(payload)))
             payload, reason = self._inflated.expand(payload, most)
         if reason is None:
-            reason = _refusal(payload, policy, origin_at, now)
+            began_at = now - took_s * (not policy.is_command)
+            reason = _refusal(payload, policy, origin_at, began_at)
         # Without a control channel there are no STAMPs, so the age is never known.
         if reason == "rx_no_age" and not self._has_control:
             reason = None
@@ -113,9 +116,12 @@ class Acceptance:
 
 
 def _refusal(
-    payload: bytes, policy: TopicPolicy, origin_at: float | None, now: float
+    payload: bytes, policy: TopicPolicy, origin_at: float | None, began_at: float
 ) -> str | None:
-    """The ledger's reason for not handing over a complete message; None: it is handed over."""
+    """The ledger's reason for not handing over a complete message; None: it is handed over.
+
+    Its lifespan must not have ended by `began_at`.
+    """
     if len(payload) < CDR_HEADER_SIZE:
         return "rx_bad_cdr"
     if policy.max_bytes and len(payload) > policy.max_bytes:
@@ -123,6 +129,6 @@ def _refusal(
     if policy.own_lifespan_s < inf:
         if origin_at is None:
             return "rx_no_age" if policy.stamp else None
-        if now - origin_at > policy.own_lifespan_s:
+        if began_at - origin_at > policy.own_lifespan_s:
             return "rx_expired"
     return None

@@ -77,8 +77,9 @@ class Completion:
         if not message.is_proven and not self._acceptance.takes_unproven(topic):
             self._end(message, "rx_unproven", now, events)
             return
+        took_s = message.heard_at - message.began_at
         payload, refused = self._acceptance.judge(
-            topic, message.payload, message.is_compressed, message.origin.at, now
+            topic, message.payload, message.is_compressed, message.origin.at, took_s, now
         )
         if refused is not None:
             self._end(message, refused, now, events)

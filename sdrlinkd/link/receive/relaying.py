@@ -44,7 +44,9 @@ class Relaying:
         )  # fmt: skip
 
     def _fresh_until(self, pdu: Pdu) -> float:
-        """Time at which all messages in `pdu` will be too old; infinity if unknown."""
+        """Time at which all messages in `pdu` will be too old; infinity if unknown, or if one of
+        them, not a command, has begun, as it is then finished.
+        """
         until = -inf
         for entry in pdu.entries:
             topic_id = entry.topic_id
@@ -53,6 +55,9 @@ class Relaying:
             origin_at = self._ages.look(pdu.src, topic_id, entry.entry_id).at
             if origin_at is None:
                 return inf
-            policy = self._acceptance.policy_of(self._topics.topic(pdu.src, topic_id))
+            topic = self._topics.topic(pdu.src, topic_id)
+            policy = self._acceptance.policy_of(topic)
+            if entry.total > 1 and not policy.is_command:
+                return inf
             until = max(until, origin_at + policy.own_lifespan_s)
         return until if until > -inf else inf

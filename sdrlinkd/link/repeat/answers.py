@@ -117,7 +117,7 @@ class Answers:
             if kept is None or not kept.is_for(asker) or self._is_stale(kept):
                 self._unknown += is_asked
                 continue
-            if kept.expires_at() <= at:
+            if kept.worth_until() <= at:
                 self._expired += 1
                 continue
             key = kept.src, number
@@ -166,7 +166,7 @@ class Answers:
         due = []
         for key, each in list(self.wanted.items()):
             kept = each.kept
-            if kept.expires_at() <= start:
+            if kept.worth_until() <= start:
                 self._expired += 1
                 del self.wanted[key]
             elif kept.first_at < start - AGAIN_S or self._is_stale(kept):

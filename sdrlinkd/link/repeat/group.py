@@ -40,7 +40,7 @@ class RepeatGroup(NamedTuple):
 
     def alive(self, start: float) -> "RepeatGroup":
         """Those that hold a message that is not too old at `start`."""
-        return self._replace(kept=[kept for kept in self.kept if kept.expires_at() > start])
+        return self._replace(kept=[kept for kept in self.kept if kept.worth_until() > start])
 
     def told(self, start: float, room: int) -> tuple[list[Repeat], "RepeatGroup"]:
         """(REPEAT records for a burst at `start`, of at most `room` octets, what they name)."""

@@ -58,11 +58,11 @@ class Kept(NamedTuple):
         """The robot that it is for."""
         return self.octets[DST]
 
-    def expires_at(self) -> float:
-        """When all messages in it have outlived their lifespans."""
+    def worth_until(self) -> float:
+        """When no message in it is worth sending any longer."""
         if len(self.carried) == 1:
-            return self.carried[0].expires_at
-        return max(message.expires_at for message in self.carried)
+            return self.carried[0].worth_until
+        return max(message.worth_until for message in self.carried)
 
     def is_for(self, robot: int) -> bool:
         """Whether a robot may need it: as its destination, or to relay it."""

@@ -72,9 +72,9 @@ class Burst(NamedTuple):
                     yield octets, number, messages[0].is_bare
 
     def is_in_vain(self, now: float) -> bool:
-        """Whether all messages inside have outlived their lifespans, and there are some."""
+        """Whether no message inside is worth sending any longer, and there are some."""
         inside = [message for messages in self.carried for message in messages]
-        return bool(inside) and all(message.expires_at <= now for message in inside)
+        return bool(inside) and all(message.worth_until <= now for message in inside)
 
 
 class Outcome(Enum):
