@@ -24,6 +24,10 @@ def set_policy(
         Text, typer.Option(help="urgent, latency, default or bulk.", autocompletion=one_of(*QOS))
     ] = None,
     priority: Annotated[int | None, typer.Option(help="0 to 127; 127 is the most urgent.")] = None,
+    weight: Annotated[
+        float | None,
+        typer.Option(help="Share of the air among topics of its class and priority; usually 1."),
+    ] = None,
     period: Annotated[
         Text, typer.Option(help="Least time between messages: 0.1, 100ms; 0: none.")
     ] = None,
@@ -78,6 +82,7 @@ def set_policy(
     given: dict[str, Any] = {
         "qos": qos,
         "priority": priority,
+        "weight": weight,
         "period_s": None if period is None else seconds(period, "--period"),
         "lifespan_s": None if lifespan is None else seconds(lifespan, "--lifespan"),
         "deadman_s": None if deadman is None else seconds(deadman, "--deadman"),

@@ -26,6 +26,7 @@ from sdrlinkd.link.qos import (
 )
 from sdrlinkd.link.queue import (
     DEFAULT_POLICY,
+    HEAD_START,
     RX_PDU_REASONS,
     RX_REASONS,
     TX_REASONS,
@@ -81,6 +82,7 @@ __all__ = [
     "CLASSES",
     "CLOCK_ERROR_S",
     "DEFAULT_POLICY",
+    "HEAD_START",
     "IDLE_SHARE",
     "LEAST_TURNS",
     "MARGIN_S",

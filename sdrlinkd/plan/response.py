@@ -4,13 +4,17 @@ A message waits for more urgent messages and for one burst of less urgent ones (
 1986, with blocking): `R = G + B + C + Σ ⌈R / T_j⌉ C_j` over all topics j served before it. G is the
 wait for a turn, B the blocking, C the message's own airtime; all but G is served in turns. If R is
 longer than the topic's own period, its next messages are analyzed, too (Lehoczky 1990).
+
+Topics of equal class and priority share the air fairly, so such a topic j takes no more than its
+weight allows: `C_j` in all is at most C · w_j / w, and the PDUs by which it may be ahead. That
+bounds the latency of a topic below its share whatever the others offer.
 """
 
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from sdrlinkd.link import IDLE_SHARE, OVERRUN, SHARED_OVERRUN, Qos, TopicPolicy
+from sdrlinkd.link import HEAD_START, IDLE_SHARE, OVERRUN, SHARED_OVERRUN, Qos, TopicPolicy
 from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.supply import LEVEL, Supply
 from sdrlinkd.plan.traffic import Load
@@ -19,6 +23,9 @@ FOREVER = float("inf")
 ROUNDS = 5000
 MOST_WAITING = 200
 """Most messages of one topic that may wait; with more, the latency counts as unbounded."""
+AHEAD = HEAD_START + 2
+"""PDUs that a topic may send before another of its rank without having earned them: its head start,
+and one PDU of either."""
 RECORDS_S, RECORDS = 1.0, 0.02
 """Period in s of one PDU with a beacon's records, and share of airtime for all CLOCKs and RECEIPTs.
 """
@@ -46,7 +53,9 @@ def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply)
     lower = [other for other in tasks if other.rank > task.rank]
     before = [other for other in tasks if other.rank <= task.rank and other is not task]
     beside = _beside(task, lower, supply)
-    demand = sum(other.cost_s / other.period_s for other in (task, *before, *beside))
+    own = task.cost_s / task.period_s
+    demand = own + sum(other.cost_s / other.period_s for other in beside)
+    demand += sum(min(each.cost_s / each.period_s, _ratio(each, task) * own) for each in before)
     if demand * (1 + supply.others) > supply.share:
         return FOREVER
     found_s, done_s = 0.0, 0.0
@@ -94,8 +103,12 @@ def _done_s(
     own_s = number * (task.most_s + task.bursts * supply.passed_s)
     until_s = rest_s + supply.takes(own_s)
     for _ in range(ROUNDS):
-        busy_s = sum(
-            math.ceil(until_s / other.period_s) * other.most_s * robots for other in before
+        busy_s = robots * sum(
+            min(
+                math.ceil(until_s / other.period_s) * other.most_s,
+                _ratio(other, task) * own_s + AHEAD * setting.each_s,
+            )
+            for other in before
         )
         busy_s += supply.others * math.ceil(until_s / task.period_s) * task.most_s
         # Keeping the channel free for them wastes the time that does not fill a PDU.
@@ -122,6 +135,11 @@ def _done_s(
             break
         until_s = more_s
     return FOREVER
+
+
+def _ratio(other: Task, task: Task) -> float:
+    """How much airtime another topic may take for each second that `task` takes."""
+    return other.policy.weight / task.policy.weight if other.rank == task.rank else FOREVER
 
 
 def _level(task: Task) -> bool:

@@ -28,6 +28,7 @@ from tests.link.world import compose, make_link, rx, send_all, tx
 def any_policy(rng):
     return TopicPolicy(
         depth=rng.choice((0, 0, 1, 3)),
+        weight=rng.choice((0.1, 1.0, 1.0, 7.0)),
         lifespan_s=rng.choice((0.2, 1e9)),
         period_s=rng.choice((0.0, 0.0, 0.03)),
         decimate=rng.choice((1, 1, 2)),

@@ -6,7 +6,7 @@ PDUs and knows nothing of radio or channel.
 
 from sdrlinkd.link.queue.admission import NOT_TAKEN
 from sdrlinkd.link.queue.compression import Deflated, Inflated, most_expanded, train_dictionary
-from sdrlinkd.link.queue.fair import Level, with_first
+from sdrlinkd.link.queue.fair import HEAD_START, Level, with_first
 from sdrlinkd.link.queue.fate import STEPS, Fate, Step
 from sdrlinkd.link.queue.intake import Intake
 from sdrlinkd.link.queue.latched import Kept, Latched, Offer
@@ -26,6 +26,7 @@ from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
 
 __all__ = [
     "DEFAULT_POLICY",
+    "HEAD_START",
     "NOT_TAKEN",
     "RX_PDU_REASONS",
     "RX_REASONS",

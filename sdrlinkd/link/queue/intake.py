@@ -31,8 +31,8 @@ from sdrlinkd.wire import (
     part_size,
 )
 
-RELAYED = 512
-"""Lanes of relayed PDUs have this plus their source in place of a topic id."""
+RELAYED = 1 << 16
+"""Lanes of relayed PDUs have this, plus 512 times their source, plus their topic, as topic id."""
 UNLIKELY_AGE_S = 10.0
 """Age in s above which a message without a lifespan was probably stamped by another clock or comes
 from a recording; its age then counts from its submission."""
@@ -118,15 +118,18 @@ class Intake:
     ) -> str | None:  # fmt: skip
         """Queue another robot's PDU, which arrived at `at` and is worthless after `until`.
 
-        `number` is its PDU number, None if unknown. It gets the highest priority of its topics.
+        `number` is its PDU number, None if unknown. It gets the highest priority of its topics,
+        and is charged to that topic of its source.
         `is_bare`: it holds only control records.
         Returns None, or the ledger's reason for refusing it.
         """
         tally = self._relayed
         tally.accept()
-        priority = max((self._priority(each.topic_id) for each in pdu.entries), default=0)
+        ranks = [(self._priority(each.topic_id), each.topic_id) for each in pdu.entries]
+        priority, topic = max(ranks, default=(0, 0))
+        of_source = RELAYED + 512 * pdu.src + topic
         message = Outgoing(
-            RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally,
+            of_source, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally,
             is_whole=True, pdu_number=number, is_bare=is_bare,
         )  # fmt: skip
         return self._outbox.put(message, DEFAULT_POLICY, bytes_per_s)

@@ -424,6 +424,9 @@ class BurstScheduler:
         access.sent(burst.start + burst.airtime_s, self._relayed_src(burst.pdus))
         if burst.repeated is not None:
             self._ready_at = None
+            for kept in burst.repeated.kept:
+                for message in kept.carried:
+                    self._outbox.charge(message, len(kept.octets) / len(kept.carried))
         self._number += 1
         return burst._replace(number=self._number)
 

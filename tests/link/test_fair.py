@@ -1,0 +1,145 @@
+"""Topics of one class and priority share the air, and one below its share waits for little."""
+
+import struct
+from collections import Counter
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sdrlinkd.link import HEAD_START, Offer, Opportunity, Outcome, Overrides, Qos, TopicPolicy
+from sdrlinkd.wire import equal_payload
+from tests.laws import law
+from tests.link.world import make_link
+
+PDU_SIZE = 220
+PDU_S = 0.001
+BURST = 8
+ROOM = equal_payload(PDU_SIZE, 1)
+AHEAD = HEAD_START + 2
+
+
+class Air:
+    """Sends what one link has, in bursts of at most BURST PDUs, in virtual time."""
+
+    def __init__(self, n_topics, weights=(), seed=1, **params):
+        self.link = make_link(
+            topics=None, has_numbers=True, pdu_size=PDU_SIZE, seed=seed, **params
+        )
+        self.topics = []
+        for i in range(n_topics):
+            offer = Offer(f"t{i}", "std_msgs/msg/String")
+            self.topics.append(self.link.declare(offer).id)
+        for topic, weight in zip(self.topics, weights, strict=False):
+            self.link.set_policy(topic, TopicPolicy(weight=weight))
+        self.now = 0.0
+        self.n_sent = 0
+        self.sent = Counter()
+        """PDUs by topic; one with entries of several topics counts in equal parts."""
+        self.done_at = {}
+        """When the last fragment of a message had left, by the number that it begins with."""
+
+    def submit(self, i, number, size, at, **wishes):
+        payload = struct.pack("<I", number) + bytes(max(0, size - 4))
+        return self.link.submit(self.topics[i], payload, at, Overrides(**wishes))
+
+    def step(self):
+        """Send one burst; False if there is nothing to send."""
+        link = self.link
+        burst = link.next_burst(
+            Opportunity(self.now, lambda _, n: n * PDU_S, lambda _, s: min(BURST, int(s / PDU_S)))
+        )
+        if burst is None:
+            return False
+        self.now = max(self.now, burst.start) + len(burst.pdus) * PDU_S
+        for carried in burst.carried:
+            for message in carried:
+                self.sent[self.topics.index(message.topic_id)] += 1 / len(carried)
+                self.done_at[struct.unpack_from("<I", message.payload)[0]] = self.now
+        link.confirm(burst, Outcome.SENT, self.now)
+        return True
+
+
+@law(60)
+@given(n=st.integers(2, 16), seed=st.integers(0, 2**32))
+def test_topics_that_always_have_something_get_air_by_their_weights(n, seed):
+    rng = Random(seed)
+    weights = [rng.choice((0.5, 1.0, 1.0, 4.0)) for _ in range(n)]
+    sizes = [rng.choice((20, 150, 400, 3000)) for _ in range(n)]
+    air = Air(n, weights, seed)
+    queued, number = Counter(), 0
+    while air.now < 0.1 * n:
+        for i in range(n):
+            # Twice what could be sent in a burst.
+            while queued[i] < air.sent[i] * ROOM + 2 * BURST * ROOM:
+                air.submit(i, number, sizes[i], air.now)
+                queued[i] += sizes[i]
+                number += 1
+        assert air.step()
+    for i in range(n):
+        for j in range(n):
+            # Entries of several topics that share a PDU have headers, and sizes of their own.
+            off = air.sent[i] / weights[i] - air.sent[j] / weights[j]
+            assert off <= AHEAD / weights[i] + AHEAD / weights[j] + 0.1 * air.sent[i] / weights[i]
+
+
+@law(300)
+@given(n=st.integers(2, 64), seed=st.integers(0, 2**32))
+def test_a_topic_below_its_share_waits_for_no_more_than_its_bound(n, seed):
+    rng = Random(seed)
+    weights = [rng.choice((0.5, 1.0, 1.0, 4.0)) for _ in range(n)]
+    air = Air(n, weights, seed)
+    share = weights[0] / sum(weights)
+    size = rng.choice((20, 150, 400, 1500))
+    n_pdus = -(-(size + 20) // (ROOM - 20)) + 1
+    period_s = n_pdus * PDU_S / share * rng.uniform(1.0, 3.0)
+    bound_s = (BURST + n_pdus / share + AHEAD * (n - 1) + 1) * PDU_S
+    others = [(i, rng.choice((20, 150, 400, 3000, 9000))) for i in range(1, n)]
+    due = {i: rng.random() * period_s for i in range(n)}
+    number, came_at, waited = 1, {}, []
+    while len(came_at) < 12:
+        for i, other in others:
+            # Each offers more than its share, or now and then a whole heap.
+            while due[i] <= air.now:
+                for _ in range(rng.choice((1, 1, 1, 5))):
+                    air.submit(i, 0, other, due[i])
+                due[i] += other / ROOM * PDU_S * sum(weights) / weights[i] * rng.uniform(0.2, 1.2)
+        while due[0] <= air.now:
+            air.submit(0, number, size, due[0])
+            came_at[number] = due[0]
+            number += 1
+            due[0] += period_s
+        if not air.step():
+            air.now = min(due.values())
+    while len(air.done_at) <= len(came_at) and air.step():
+        pass
+    waited = [air.done_at[each] - at for each, at in came_at.items()]
+    assert max(waited) <= bound_s
+
+
+def test_one_that_was_away_goes_first_and_saves_up_no_more_than_its_head_start():
+    air = Air(2)
+    for _ in range(200):
+        air.submit(0, 0, 150, 0.0)
+    for _ in range(5):
+        air.step()
+    for _ in range(200):
+        air.submit(1, 1, 150, air.now)
+    before = air.sent[0]
+    air.step()
+    assert air.sent[1] >= HEAD_START
+    for _ in range(10):
+        air.step()
+    assert air.sent[1] - (air.sent[0] - before) <= AHEAD
+
+
+@pytest.mark.parametrize("qos", Qos)
+def test_reliability_and_lifespans_do_not_change_the_order_of_topics(qos):
+    air = Air(2)
+    for _ in range(100):
+        air.submit(0, 0, 150, 0.0, qos=qos, lifespan_s=0.5)
+        air.submit(1, 1, 150, 0.0, qos=qos)
+    for _ in range(4):
+        air.step()
+    assert air.sent[0] == pytest.approx(air.sent[1], abs=1)
