@@ -167,7 +167,8 @@ def test_row_18_soak(start_daemon, lasting, figure):
                 frozen.line()
                 frozen.send_signal(signal.SIGSTOP)
                 for _ in range(min(200, int(100 * left) + 20)):
-                    out.send("/robot_1/odom", CDR + bytes(700), qos="urgent")
+                    # A machine may be busy for longer than the lifespan of the class.
+                    out.send("/robot_1/odom", CDR + bytes(700), qos="urgent", lifespan_ms=60_000)
                     n += 1
                     time.sleep(0.005)
                 flood.kill()
