@@ -549,4 +549,4 @@ def test_a_pdu_lives_as_long_as_one_of_its_messages():
     for lives, end in (((1.0,), 1.0), ((1.0, 3.0, 2.0), 3.0)):
         messages = [outgoing(expires_at=each) for each in lives]
         kept = kept_pdus.keep(10, pdu(10), pdu(10), 3, Qos.DEFAULT, messages, 0.0)
-        assert kept.expires_at() == end
+        assert kept.worth_until() == end

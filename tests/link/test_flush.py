@@ -225,10 +225,11 @@ def test_what_the_setting_means_in_words(flush_s, told):
     assert flush_told(flush_s) == f"link.flush_s = {told}"
 
 
-def test_what_waits_behind_the_rest_of_an_expired_message_goes_when_that_is_dropped():
+def test_what_waits_behind_the_rest_of_an_expired_command_goes_when_that_is_dropped():
     """The one with a lifespan does not wait, and takes the waiting ones along."""
     link = make_link(pdu_size=256, flush_s=0.0)
-    link.set_policies({0: TopicPolicy(lifespan_s=0.5), 1: TopicPolicy(qos="bulk")})
+    command = TopicPolicy(lifespan_s=0.5, deadman_s=1.0)
+    link.set_policies({0: command, 1: TopicPolicy(qos="bulk")})
     link.submit(0, bytes(600), 0.0)
     link.confirm(compose(link, 0.1, 2), Outcome.SENT, 0.1)
     link.submit(1, bytes(28), 0.2)

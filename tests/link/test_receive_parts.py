@@ -263,11 +263,26 @@ def test_what_is_kept_for_later_and_what_comes_too_late(policy, depth, own, decl
 def test_a_message_is_handed_over_or_dropped_by_its_policy(policy, size, origin_at, reason):
     acceptance = accepting()
     acceptance.set_policy(0, policy)
-    assert acceptance.judge(ODOM, bytes(size), False, origin_at, 5.0) == (bytes(size), reason)
+    assert acceptance.judge(ODOM, bytes(size), False, origin_at, 0.0, 5.0) == (bytes(size), reason)
     without_ages = accepting(FULL)
     without_ages.set_policy(0, policy)
     expected = None if reason == "rx_no_age" else reason
-    assert without_ages.judge(ODOM, bytes(size), False, origin_at, 5.0)[1] == expected
+    assert without_ages.judge(ODOM, bytes(size), False, origin_at, 0.0, 5.0)[1] == expected
+
+
+@pytest.mark.parametrize(
+    ("policy", "took_s", "reason"),
+    [
+        (TopicPolicy(lifespan_s=1.0), 2.0, None),
+        (TopicPolicy(lifespan_s=1.0), 1.9, "rx_expired"),
+        (TopicPolicy(lifespan_s=1.0, deadman_s=0.5), 2.0, "rx_expired"),
+        (TopicPolicy(lifespan_s=1.0, qos="urgent"), 2.0, "rx_expired"),
+    ],
+)
+def test_the_time_on_the_air_does_not_count_except_for_commands(policy, took_s, reason):
+    acceptance = accepting()
+    acceptance.set_policy(0, policy)
+    assert acceptance.judge(ODOM, bytes(9), False, 2.0, took_s, 5.0)[1] == reason
 
 
 def test_how_far_a_message_may_expand():
@@ -278,7 +293,7 @@ def test_how_far_a_message_may_expand():
         acceptance.set_policy(0, TopicPolicy(max_bytes=max_bytes))
         frame = zstandard.ZstdCompressor().compress(bytes(size))
         assert 64 * len(frame) < 1 << 16
-        payload, reason = acceptance.judge(ODOM, frame, True, None, 5.0)
+        payload, reason = acceptance.judge(ODOM, frame, True, None, 0.0, 5.0)
         assert payload == (b"" if reason else bytes(size))
         return reason
 

@@ -210,7 +210,7 @@ class Composer:
         draft = Draft(self._pdu_size)
         if told:
             draft.add_record(told)
-        looked_at = 0
+        room, looked_at = draft.room, 0
         order = levels if first is None else with_first(levels, first)
         for level in tuple(order):
             may_relay = outbox.relays and draft.dst == NO_DST
@@ -231,14 +231,15 @@ class Composer:
             for message in draft.carried:
                 if not message.stamped:
                     self._writer.stamp(draft, message, start)
+        unused = draft.room
         if self._piggyback.waiting and draft.dst == BROADCAST:
             self._piggyback.ride(draft, start, self.next_number)
         if self._bare.untold:
             self._bare.ride(draft, self.next_number)
-        if draft.room > 0 and draft.carried:
-            # What the PDU leaves unused is air, too.
-            for message in draft.carried:
-                outbox.charge(message, draft.room / len(draft.carried))
+        rest = room - draft.charged - (unused - draft.room)
+        for message in draft.carried:
+            # Ages, and what the PDU leaves unused, are air, too.
+            outbox.charge(message, rest / len(draft.carried))
         return self._finish(draft, self.next_number)
 
     def _next_full(self, start: float, most: int, source: int | None) -> list[BuiltPdu]:

@@ -43,11 +43,13 @@ class Draft(PduBuilder):
     `dst` is NO_DST until it holds something of a message: an entry, a STAMP, or parity.
     """
 
-    __slots__ = ("carried", "dst", "is_compressed", "qos")
+    __slots__ = ("carried", "charged", "dst", "is_compressed", "qos")
 
     def __init__(self, pdu_size: int) -> None:
         super().__init__(pdu_size)
         self.carried: list[Outgoing] = []
+        self.charged = 0
+        """Octets of it that topics were charged for."""
         self.dst = NO_DST
         self.is_compressed = False
         self.qos = Qos.BULK
@@ -136,6 +138,7 @@ class EntryWriter:
             if self._parity[head.qos] or head.channel == PARTS:
                 head.follow_with(self._parity_of(head))
             self._end(lane, head, start)
+        draft.charged += length + beside
         self._outbox.served(lane, length + beside)
         return True
 
@@ -156,6 +159,7 @@ class EntryWriter:
         draft.join(head)
         head.ride()
         self._end(lane, head, start)
+        draft.charged += room - draft.room
         self._outbox.served(lane, room - draft.room)
         return True
 
