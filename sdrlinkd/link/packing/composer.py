@@ -239,7 +239,7 @@ class Composer:
         rest = room - draft.charged - (unused - draft.room)
         for message in draft.carried:
             # Ages, and what the PDU leaves unused, are air, too.
-            outbox.charge(message, rest / len(draft.carried))
+            message.owe(rest / len(draft.carried))
         return self._finish(draft, self.next_number)
 
     def _next_full(self, start: float, most: int, source: int | None) -> list[BuiltPdu]:

@@ -55,7 +55,9 @@ class Level:
         """Add a lane whose first message is `head`."""
         account = lane.account
         if not account.lanes:
-            account.spent = max(account.spent, self._now - self._head_start / account.weight)
+            spent = account.spent + account.owed / account.weight
+            account.spent = max(spent, self._now - self._head_start / account.weight)
+            account.owed = 0.0
         account.lanes.append(lane)
         self._place(lane, head)
         self.per_dst[lane.dst] = self.per_dst.get(lane.dst, 0) + 1
@@ -73,9 +75,9 @@ class Level:
 
     def charge(self, account: Account, octets: float) -> None:
         """Charge a topic for octets that it sent, and move its lanes back accordingly."""
-        if octets:
-            self._now = max(self._now, account.spent)
-            account.spent += octets / account.weight
+        self._now = max(self._now, account.spent)
+        account.spent += (octets + account.owed) / account.weight
+        account.owed = 0.0
         for lane in account.lanes:
             self.move(lane)
         # A topic that could not be served has saved up no more than one that had nothing to send.

@@ -217,6 +217,10 @@ class Outgoing:
         """Note that receipts were requested from the receivers."""
         self.is_expected = True
 
+    def owe(self, octets: float) -> None:
+        """Charge its topic for octets that do not come from the queue, when it is served next."""
+        self.lane.account.owed += octets
+
     def confirm(self) -> None:
         """Note that the radio has reported the outcome of one PDU with a part of the message."""
         self.unconfirmed -= 1
@@ -231,12 +235,14 @@ class Outgoing:
 class Account:
     """What one topic has sent at one class and priority, in octets divided by its weight."""
 
-    __slots__ = ("lanes", "spent", "topic_id", "weight")
+    __slots__ = ("lanes", "owed", "spent", "topic_id", "weight")
 
     def __init__(self, topic_id: int) -> None:
         self.topic_id = topic_id
         self.weight = 1.0
         self.spent = -inf
+        self.owed = 0.0
+        """Octets that are charged when the topic is served next."""
         self.lanes: list[Lane] = []
         """The topic's lanes that have something to send."""
 

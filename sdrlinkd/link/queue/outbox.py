@@ -107,12 +107,6 @@ class Outbox:
             self._follow_up(lane, level)
         level.charge(lane.account, octets)
 
-    def charge(self, message: Outgoing, octets: float) -> None:
-        """Charge the topic of `message` for octets that do not come from the queue."""
-        level = self._level_by_key.get(message.lane.level_key)
-        if level is not None:
-            level.charge(message.lane.account, octets)
-
     def withdraw_head(self, lane: Lane) -> Outgoing:
         """Remove the lane's head, with all its fragments, and return it."""
         if lane.current is not None:

@@ -426,7 +426,7 @@ class BurstScheduler:
             self._ready_at = None
             for kept in burst.repeated.kept:
                 for message in kept.carried:
-                    self._outbox.charge(message, len(kept.octets) / len(kept.carried))
+                    message.owe(len(kept.octets) / len(kept.carried))
         self._number += 1
         return burst._replace(number=self._number)
 
