@@ -7,8 +7,6 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
-import msgspec
-
 from backends import AirParams, RadioParams, World
 from benchmarks.worlds.arrivals import Arrival
 from benchmarks.worlds.bursts import Simulation
@@ -77,8 +75,9 @@ def drive(
     topics = {}
     for flow in flows:
         setup, link = setups[flow.src], links[flow.src]
+        named = {topic.name: topic.id for topic in setup.registry.topics}
         if not declared:
-            topics[flow.src, flow.name] = setup.registry.by_name(flow.name).id
+            topics[flow.src, flow.name] = named[flow.name]
             continue
         policies = Policies(setup, link)
         declaration = Declaration(
@@ -88,7 +87,7 @@ def drive(
         topic = link.declare(declaration.offer(setup.name_on_air(declaration.name)))
         policies.offer(topic.id, declaration)
         topics[flow.src, flow.name] = topic.id
-    ages: dict[tuple[int, int], dict[int, float]] = {key: {} for key in topics}
+    ages: dict[tuple[int, str], dict[int, float]] = {key: {} for key in topics}
     by_topic = {(src, number): (src, name) for (src, name), number in topics.items()}
     sent = {(flow.src, flow.name): flow for flow in flows}
 

@@ -47,7 +47,9 @@ class Air:
         """Send one burst; False if there is nothing to send."""
         link = self.link
         burst = link.next_burst(
-            Opportunity(self.now, lambda _, n: n * PDU_S, lambda _, s: int(min(BURST, s / PDU_S + 1e-6)))
+            Opportunity(
+                self.now, lambda _, n: n * PDU_S, lambda _, s: int(min(BURST, s / PDU_S + 1e-6))
+            )
         )
         if burst is None:
             return False
