@@ -16,6 +16,12 @@ TEXTS = {
         "acknowledgments with the times of OpenPGM's examples; it shares the air without beacons "
         "or clocks. Losses in bursts last 50 ms on average."
     ),
+    "defaults": (
+        "A team with the files that `init` writes for the simulated air, as whole links in virtual "
+        "time; only rate and MCS are overridden. Producers declare their topics, and nothing is "
+        "configured for them. *before*: the same, before topics shared the air fairly and before "
+        "messages that have begun were finished."
+    ),
     "fleet": (
         "Real daemons, gateways and a Zenoh router on one machine. An air of PDUs carries what the "
         "robot sends, 724 B at 100 Hz, and loses it for each gateway by chance: 6, 22 and 40 %. "

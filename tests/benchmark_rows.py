@@ -35,6 +35,15 @@ ROWS = {
         "images_delivered_2pct_random_pct",
         "urgent_lost_twice_pct",
     },
+    "defaults": {
+        *(
+            f"odom_beside_{big}_{each}" for big in ("200kB", "1MB", "3MB")
+            for each in ("pct", "p50_ms", "p99_ms")
+        ),
+        *(f"big_{big}_of_the_rest_pct" for big in ("200kB", "1MB", "3MB")),
+        "400kB_best_effort", "1500kB_reliable",
+        *(f"alone_{size}_pct" for size in ("50kB", "400kB", "800kB", "1500kB")),
+    },
     "fleet": {
         *(
             f"{each}_{n}_gateways" for n in (2, 3)

@@ -26,6 +26,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "repeats": Benchmark(
         "Messages over an air that loses PDUs: with repeats, and as others do it.", 3,
     ),
+    "defaults": Benchmark("What a user gets who has configured nothing, under any load.", 2),
     "team": Benchmark(
         "Teams on one channel: hops, crowds, worst cases, and how soon routes heal.", 40
     ),
