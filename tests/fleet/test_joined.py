@@ -140,6 +140,7 @@ async def join(tmp_path):
 
 async def test_what_the_daemon_hears_is_put_and_can_be_asked_for(join, caplog):
     daemon, network = join.daemon, join.network
+    await until(lambda: bool(join.at(KEYS.route(ROBOT))))
     claims = [read_claim(each.payload.to_bytes()) for each in join.at(KEYS.route(ROBOT))]
     assert claims[0] == Claim(OWN, 1, 1.0)
     await until(lambda: len(join.at(KEYS.route(ROBOT))) > 2)
