@@ -105,8 +105,8 @@ def test_what_has_begun_is_finished_whatever_its_lifespan():
     for _ in range(2):
         link.submit(0, bytes(200), 0.0, Overrides(lifespan_s=0.4))
     begun = compose(link, 0.3, 2)
+    link.confirm(begun, Outcome.SENT, 0.31)
     rest = send_all(link, now=0.7)
-    link.confirm(begun, Outcome.SENT, 0.8)
     assert len(begun.pdus) + len(rest) == 5
     assert topic_of(link, 0).sent == 1
     assert dropped(link) == {("odom", "tx_expired"): 1}

@@ -32,7 +32,7 @@ class Lives:
         """Settle a burst that left; `carried` lists the messages with a part in each PDU."""
         for messages in carried:
             for message in messages:
-                message.confirm()
+                message.confirm(has_left=True)
                 if (
                     message.fate is Fate.IN_FLIGHT
                     and not message.unconfirmed
@@ -50,7 +50,7 @@ class Lives:
         unfinished: list[Outgoing] = []
         for messages in carried:
             for message in messages:
-                message.confirm()
+                message.confirm(has_left=False)
                 if message.fate is Fate.IN_FLIGHT:
                     self.drop(message, reason)
                     if message.lane.current is message:

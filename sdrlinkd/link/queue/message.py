@@ -20,8 +20,8 @@ class Outgoing:
 
     __slots__ = (
         "_parting", "arrived_at", "body", "channel", "dst", "entry_id", "expires_at", "fate",
-        "held_ids", "ids", "is_bare", "is_command", "is_compressed", "is_expected", "is_whole", "k",
-        "key", "lane", "last_at", "n_repeats", "next_index", "overhead", "parity", "parts_left",
+        "has_left", "held_ids", "ids", "is_bare", "is_command", "is_compressed", "is_expected",
+        "is_whole", "k", "key", "lane", "last_at", "n_repeats", "next_index", "overhead", "parity", "parts_left",
         "payload", "pdu_number", "priority", "qos", "receipt", "rests_id", "stamped", "tally",
         "topic_id", "total", "unconfirmed",
     )  # fmt: skip
@@ -95,6 +95,8 @@ class Outgoing:
         """All entry ids that the message has used: one for each part."""
         self.held_ids: tuple[int, ...] = ()
         """Those held, as fragments leave later than planned."""
+        self.has_left = False
+        """Whether the radio has reported that a part of the message left."""
         self.unconfirmed = 0
         """Number of PDUs with a part of the message whose outcome the radio has not reported."""
         self.parity: list[bytes] = []
@@ -138,7 +140,7 @@ class Outgoing:
         A lifespan decides whether sending begins: what has begun is finished, except a command. A
         message that needs more airtime than its lifespan would never arrive otherwise.
         """
-        return inf if self.rests_id and not self.is_command else self.expires_at
+        return inf if self.has_left and not self.is_command else self.expires_at
 
     def in_vain(self, now: float, patience_s: float) -> str:
         """The ledger's reason to stop sending the message; empty while it is worth sending.
@@ -221,9 +223,10 @@ class Outgoing:
         """Charge its topic for octets that do not come from the queue, when it is served next."""
         self.lane.account.owed += octets
 
-    def confirm(self) -> None:
+    def confirm(self, *, has_left: bool) -> None:
         """Note that the radio has reported the outcome of one PDU with a part of the message."""
         self.unconfirmed -= 1
+        self.has_left = self.has_left or (has_left and self.rests_id)
 
     def _next_body(self) -> None:
         if self._parting is not None:
