@@ -21,9 +21,9 @@ class Outgoing:
     __slots__ = (
         "_parting", "arrived_at", "body", "channel", "dst", "entry_id", "expires_at", "fate",
         "has_left", "held_ids", "ids", "is_bare", "is_command", "is_compressed", "is_expected",
-        "is_whole", "k", "key", "lane", "last_at", "n_repeats", "next_index", "overhead", "parity", "parts_left",
-        "payload", "pdu_number", "priority", "qos", "receipt", "rests_id", "stamped", "tally",
-        "topic_id", "total", "unconfirmed",
+        "is_whole", "k", "key", "lane", "last_at", "n_repeats", "next_index", "overhead", "parity",
+        "parts_left", "payload", "pdu_number", "priority", "qos", "receipt", "rests_id", "stamped",
+        "tally", "topic_id", "total", "unconfirmed",
     )  # fmt: skip
 
     def __init__(
