@@ -18,9 +18,8 @@ TEXTS = {
     ),
     "defaults": (
         "A team with the files that `init` writes for the simulated air, as whole links in virtual "
-        "time; only rate and MCS are overridden. Producers declare their topics, and nothing is "
-        "configured for them. *before*: the same, before topics shared the air fairly and before "
-        "messages that have begun were finished."
+        "time; only the MCS is overridden. Producers declare their topics, for which nothing is "
+        "configured. *before* is an earlier run of the same command (`--before`)."
     ),
     "fleet": (
         "Real daemons, gateways and a Zenoh router on one machine. An air of PDUs carries what the "

@@ -35,6 +35,7 @@ from sdrlinkd.policies import Policies
 from sdrlinkd.reloading import Reloading
 from sdrlinkd.reports import Snapshot
 from sdrlinkd.sdnotify import Notifier
+from sdrlinkd.sealing import Sealing
 from sdrlinkd.spawn import EarlyModem
 from sdrlinkd.verbs import make_verbs
 
@@ -108,24 +109,7 @@ async def _open(
     keeping = open_keeping(setup)
     if keeping is not None:
         stack.callback(keeping.close)
-    link = Link(
-        config.link,
-        config.queue,
-        config.reassembly,
-        setup.registry,
-        setup.node_id,
-        rng,
-        classes=config.classes,
-        relay=config.relay,
-        repeat=config.repeat,
-        admission=config.admission,
-        clock=config.clock,
-        dictionaries=setup.dictionaries,
-        hears_self=config.hears_self,
-        has_numbers=setup.has_numbers,
-        max_expanded=config.bus.max_message_bytes,
-        sealing=keeping.sealing if keeping is not None else None,
-    )
+    link = link_of(setup, rng, keeping.sealing if keeping is not None else None)
     policies = Policies(setup, link)
     loading = Loading()
     make = partial(_make_pdu_link, rng, loading, early)
@@ -163,6 +147,29 @@ async def _open(
     for warning in setup.all_warnings:
         log.warning("%s", warning)
     return node, control, reloading, guard
+
+
+def link_of(setup: Setup, rng: Random, sealing: Sealing | None = None) -> Link:
+    """The link of a robot with these settings."""
+    config = setup.config
+    return Link(
+        config.link,
+        config.queue,
+        config.reassembly,
+        setup.registry,
+        setup.node_id,
+        rng,
+        classes=config.classes,
+        relay=config.relay,
+        repeat=config.repeat,
+        admission=config.admission,
+        clock=config.clock,
+        dictionaries=setup.dictionaries,
+        hears_self=config.hears_self,
+        has_numbers=setup.has_numbers,
+        max_expanded=config.bus.max_message_bytes,
+        sealing=sealing,
+    )
 
 
 def _make_pdu_link(

@@ -10,142 +10,92 @@ from typing import NamedTuple
 from backends import AirParams, RadioParams, World
 from benchmarks.worlds.arrivals import Arrival
 from benchmarks.worlds.bursts import Simulation
-from sdrlinkd.config import Setup, load_config, make_setup
-from sdrlinkd.init import RADIOS, REGISTRY, FoundTopic, Team, team_files
-from sdrlinkd.link import Delivered, Link
+from sdrlinkd.config import Config, load_config, make_setup
+from sdrlinkd.daemon import link_of
+from sdrlinkd.init import RADIOS, REGISTRY, Team, team_files
+from sdrlinkd.link import Delivered
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.offers import Declaration
 from sdrlinkd.policies import Policies
 
+SENDER, LISTENER = 1, 2
+MCS = 3
+"""16QAM 1/2, where `init` writes QPSK 1/2."""
 SNR_DB = 25.0
 CDR = b"\0\1\0\0"
 _NUMBER = struct.Struct("<I")
 
 
 class Flow(NamedTuple):
-    """A topic of robot `src`: its offer, and when it has messages of how many bytes."""
+    """A topic that the sender declares, and when it has messages of how many bytes."""
 
     name: str
     type: str
     size: int
     times: Sequence[float]
     is_reliable: bool = True
-    src: int = 1
-
-
-class Outcome(NamedTuple):
-    """What became of a flow: the age in s at which each message that arrived did so, by number."""
-
-    flow: Flow
-    ages_s: Mapping[int, float]
-    dropped: Mapping[str, int]
-
-    @property
-    def delivered(self) -> float:
-        """Share of the messages that arrived."""
-        return len(self.ages_s) / max(1, len(self.flow.times))
-
-    def quantile_s(self, share: float) -> float:
-        """The age in s that this share of the messages that arrived did not exceed."""
-        ages = sorted(self.ages_s.values())
-        return ages[min(len(ages) - 1, int(share * len(ages)))] if ages else float("inf")
 
 
 class Drive(NamedTuple):
-    """The outcomes of all flows, by topic, and the robots' settings."""
+    """The age in s at which each message arrived, by topic and number, and the settings."""
 
-    outcomes: Mapping[str, Outcome]
-    setup: Setup
-    air_share: float
-    """Share of the time in which robot 1 sent."""
+    ages_s: Mapping[str, Mapping[int, float]]
+    config: Config
 
 
-def drive(
-    flows: Sequence[Flow], until_s: float, seed: int, *, robots: int = 2, mcs: int = 3,
-    rate: str = "5 Msps", declared: bool = True,
-) -> Drive:  # fmt: skip
-    """Let robot 2 hear what the others send of `flows`; all messages have until `until_s`.
-
-    The topics are `declared` by their producers, or else in a registry that `init` wrote.
-    """
-    with tempfile.TemporaryDirectory() as directory:
-        setups = _written(Path(directory), robots, mcs, rate, flows, declared=declared)
-    config = setups[1].config
-    links = {node: _link(setup, Random(100 * seed + node)) for node, setup in setups.items()}
-    topics = {}
+def drive(flows: Sequence[Flow], until_s: float, seed: int) -> Drive:
+    """Let one robot of two send all messages of `flows`, and the other hear them, until then."""
+    with tempfile.TemporaryDirectory() as name:
+        directory = Path(name)
+        setups = {
+            node: make_setup(load_config(path), directory)
+            for node, path in _written(directory).items()
+        }
+    setup = setups[SENDER]
+    config = setup.config
+    links = {node: link_of(each, Random(100 * seed + node)) for node, each in setups.items()}
+    policies, topics = Policies(setup, links[SENDER]), {}
     for flow in flows:
-        setup, link = setups[flow.src], links[flow.src]
-        named = {topic.name: topic.id for topic in setup.registry.topics}
-        if not declared:
-            topics[flow.src, flow.name] = named[flow.name]
-            continue
-        policies = Policies(setup, link)
         declaration = Declaration(
-            name=f"/robot_{flow.src}/{flow.name}", type=flow.type,
+            name=f"/robot_{SENDER}/{flow.name}", type=flow.type,
             reliability="reliable" if flow.is_reliable else "best_effort",
         )  # fmt: skip
-        topic = link.declare(declaration.offer(setup.name_on_air(declaration.name)))
-        policies.offer(topic.id, declaration)
-        topics[flow.src, flow.name] = topic.id
-    ages: dict[tuple[int, str], dict[int, float]] = {key: {} for key in topics}
-    by_topic = {(src, number): (src, name) for (src, name), number in topics.items()}
-    sent = {(flow.src, flow.name): flow for flow in flows}
+        offer = declaration.offer(setup.name_on_air(declaration.name))
+        topic_id = links[SENDER].declare(offer).id
+        policies.offer(topic_id, declaration)
+        topics[topic_id] = flow
+    ages: dict[str, dict[int, float]] = {flow.name: {} for flow in flows}
 
     def listen(node: int, message: Delivered, now: float) -> None:
-        key = by_topic.get((message.src, message.topic_id))
-        if node == 2 and key is not None:
+        if node == LISTENER:
+            flow = topics[message.topic_id]
             number = _NUMBER.unpack_from(message.payload, len(CDR))[0]
-            ages[key].setdefault(number, now - sent[key].times[number])
+            ages[flow.name].setdefault(number, now - flow.times[number])
 
-    params = AirParams(rate_hz=config.modem.rate_hz, block_s=config.modem.block_s, snr_db=SNR_DB)
-    simulation = Simulation(
-        params, World(params, {}, []), {node: RadioParams() for node in links}, links,
-        config.modem, Airtimes(config.modem, config.link.pdu_size), config.access,
-        {node: _arrivals([f for f in flows if f.src == node], topics) for node in links},
-        rate=config.rate, seed=seed, listen=listen,
-    )  # fmt: skip
-    simulation.run(until_s)
-    reports = {node: link.report(until_s) for node, link in links.items()}
-    outcomes = {}
-    for key, flow in sent.items():
-        dropped = next(
-            each.dropped for each in reports[flow.src].topics if each.topic_id == topics[key]
-        )
-        outcomes[flow.name] = Outcome(flow, ages[key], dropped)
-    airtime_s = reports[1].airtime_s
-    return Drive(outcomes, setups[1], airtime_s / until_s)
+    air = AirParams(rate_hz=config.modem.rate_hz, block_s=config.modem.block_s, snr_db=SNR_DB)
+    Simulation(
+        air, World(air, {}, []), {node: RadioParams() for node in links}, links, config.modem,
+        Airtimes(config.modem, config.link.pdu_size), config.access,
+        {SENDER: _arrivals(topics)}, rate=config.rate, seed=seed, listen=listen,
+    ).run(until_s)  # fmt: skip
+    return Drive(ages, config)
 
 
-def _written(
-    directory: Path, robots: int, mcs: int, rate: str, flows: Sequence[Flow], *, declared: bool
-) -> dict[int, Setup]:
-    """The settings of all robots as `init` writes them, but for rate and MCS."""
-    known = {} if declared else {flow.name: flow.type for flow in flows}
-    topics = [FoundTopic(*each) for each in known.items()]
-    radio = RADIOS["ether"]._replace(rate=rate)
-    team = Team(radio, robots, "", "", topics, directory, directory)
-    for name, text in team_files(team, list(range(1, robots + 1))).items():
-        if declared and name == REGISTRY:
-            continue
-        lines = text.replace("mcs = 1 ", f"mcs = {mcs} ").splitlines()
-        kept = [line for line in lines if not (declared and line.startswith("registry ="))]
-        (directory / name).write_text("\n".join(kept))
-    paths = {node: directory / f"robot_{node}.toml" for node in range(1, robots + 1)}
-    return {node: make_setup(load_config(path), directory) for node, path in paths.items()}
+def _written(directory: Path) -> dict[int, Path]:
+    """The files of `init` for a team whose producers declare their topics, but with MCS."""
+    team = Team(RADIOS["ether"], 2, "", "", [], directory, directory)
+    for name, text in team_files(team, [SENDER, LISTENER]).items():
+        if name != REGISTRY:
+            lines = text.replace("mcs = 1 ", f"mcs = {MCS} ").splitlines()
+            declared = [line for line in lines if not line.startswith("registry =")]
+            (directory / name).write_text("\n".join(declared))
+    return {node: directory / f"robot_{node}.toml" for node in (SENDER, LISTENER)}
 
 
-def _link(setup: Setup, rng: Random) -> Link:
-    config = setup.config
-    return Link(
-        config.link, config.queue, config.reassembly, setup.registry, setup.node_id, rng,
-        classes=config.classes, relay=config.relay, repeat=config.repeat,
-        admission=config.admission, clock=config.clock, dictionaries=setup.dictionaries,
-        has_numbers=setup.has_numbers, max_expanded=config.bus.max_message_bytes,
-    )  # fmt: skip
-
-
-def _arrivals(flows: Sequence[Flow], topics: Mapping[tuple[int, str], int]) -> Iterator[Arrival]:
-    due = sorted((at, n, flow) for flow in flows for n, at in enumerate(flow.times))
-    for at, n, flow in due:
-        payload = (CDR + _NUMBER.pack(n)).ljust(flow.size, b"\0")
-        yield Arrival(at, topics[flow.src, flow.name], payload)
+def _arrivals(topics: Mapping[int, Flow]) -> Iterator[Arrival]:
+    """All messages in order of time; each begins with its number."""
+    due = [
+        (at, topic_id, n) for topic_id, flow in topics.items() for n, at in enumerate(flow.times)
+    ]
+    for at, topic_id, n in sorted(due):
+        yield Arrival(at, topic_id, (CDR + _NUMBER.pack(n)).ljust(topics[topic_id].size, b"\0"))

@@ -2,16 +2,39 @@
 
 import struct
 from collections import Counter
+from math import inf
 from random import Random
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.link import HEAD_START, Offer, Opportunity, Outcome, Overrides, Qos, TopicPolicy
-from sdrlinkd.wire import ENTRY_HEADER_SIZE, equal_payload, numbered, parse
+from sdrlinkd.link import (
+    HEAD_START,
+    ClassesParams,
+    LinkParams,
+    Offer,
+    Opportunity,
+    Outcome,
+    Overrides,
+    Qos,
+    QueueParams,
+    TopicPolicy,
+)
+from sdrlinkd.link.queue import Intake, Outbox
+from sdrlinkd.link.topics import OwnTopics
+from sdrlinkd.wire import (
+    ENTRY_HEADER_SIZE,
+    Entry,
+    Pdu,
+    Registry,
+    build,
+    equal_payload,
+    numbered,
+    parse,
+)
 from tests.laws import law
-from tests.link.world import make_link
+from tests.link.world import make_link, outgoing
 
 PDU_SIZE = 220
 PDU_S = 0.001
@@ -33,7 +56,6 @@ class Air:
         for topic, weight in zip(self.topics, weights, strict=False):
             self.link.set_policy(topic, TopicPolicy(weight=weight))
         self.now = 0.0
-        self.n_sent = 0
         self.sent = Counter()
         """Octets by topic, with those of headers, and of what PDUs leave unused."""
         self.done_at = {}
@@ -69,12 +91,16 @@ class Air:
         return True
 
 
+def any_weights(n, rng):
+    return [rng.choice((0.5, 1.0, 1.0, 4.0)) for _ in range(n)]
+
+
 @pytest.mark.slow
 @law(60)
 @given(n=st.integers(2, 16), seed=st.integers(0, 2**32))
 def test_topics_that_always_have_something_get_air_by_their_weights(n, seed):
     rng = Random(seed)
-    weights = [rng.choice((0.5, 1.0, 1.0, 4.0)) for _ in range(n)]
+    weights = any_weights(n, rng)
     sizes = [rng.choice((20, 150, 400, 3000)) for _ in range(n)]
     air = Air(n, weights, seed)
     queued, number = Counter(), 0
@@ -98,7 +124,7 @@ def test_topics_that_always_have_something_get_air_by_their_weights(n, seed):
 @given(n=st.integers(2, 64), seed=st.integers(0, 2**32))
 def test_a_topic_below_its_share_waits_for_no_more_than_its_bound(n, seed):
     rng = Random(seed)
-    weights = [rng.choice((0.5, 1.0, 1.0, 4.0)) for _ in range(n)]
+    weights = any_weights(n, rng)
     air = Air(n, weights, seed)
     share = weights[0] / sum(weights)
     size = rng.choice((20, 150, 400, 1500))
@@ -153,3 +179,54 @@ def test_reliability_and_lifespans_do_not_change_the_order_of_topics(qos):
     for _ in range(4):
         air.step()
     assert air.sent[0] == pytest.approx(air.sent[1], abs=PDU_SIZE)
+
+
+def served(outbox, n):
+    """The topics of the next messages that are sent whole, as of PDUs of 64 octets."""
+    topics = []
+    for _ in range(n):
+        lane = outbox.next_message.lane
+        topics.append(lane.topic_id)
+        outbox.begin(lane, 1, 64, 1, 0.0)
+        outbox.end(lane)
+        outbox.served(lane, 64)
+    return topics
+
+
+def test_what_could_not_be_served_saves_up_no_more_than_twice_the_head_start():
+    """Such as a topic without a free entry id."""
+    outbox = Outbox(QueueParams(), 64)
+    for topic_id in (0, 1):
+        for _ in range(200):
+            outbox.put(outgoing(topic_id=topic_id), TopicPolicy(), inf)
+    blocked, other = outbox.levels[0].lanes
+    for _ in range(100):
+        outbox.begin(other, 1, 64, 1, 0.0)
+        outbox.end(other)
+        outbox.served(other, 64)
+    first = served(outbox, 20)
+    assert first.index(other.topic_id) <= 2 * HEAD_START + 1
+    assert first.count(blocked.topic_id) <= 10 + HEAD_START + 1
+
+
+def test_what_is_owed_is_paid_when_a_topic_is_served_next():
+    """Repeats and what PDUs leave unused do not come from the queue."""
+    outbox = Outbox(QueueParams(), 64)
+    messages = [outgoing(topic_id=i % 2) for i in range(40)]
+    for message in messages:
+        outbox.put(message, TopicPolicy(), inf)
+    messages[0].owe(5 * 64)
+    assert served(outbox, 10).count(0) == pytest.approx(5 - 2.5, abs=1)
+
+
+@pytest.mark.parametrize("others", [(9, 0), (9, 1), (8, 1)])
+def test_relayed_pdus_are_charged_to_their_topic_at_their_source(others):
+    outbox = Outbox(QueueParams(), 64)
+    intake = Intake(LinkParams(pdu_size=64), OwnTopics(Registry(()), True, 100), outbox,
+                    ClassesParams(), {})  # fmt: skip
+    for src, topic_id in ((9, 0), others):
+        pdu = Pdu(0, False, src, 255, 0, 2, [Entry(topic_id, 0, 0, 1, b"x")])
+        for n in range(10 if topic_id else 30):
+            assert intake.forward(pdu, build(pdu, 64), 0.0, inf, n, inf) is None
+    n_topics = len({(9, 0), others})
+    assert len({*served(outbox, 6)}) == n_topics

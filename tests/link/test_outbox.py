@@ -113,6 +113,22 @@ def test_what_has_begun_is_finished_whatever_its_lifespan():
     assert link.audit() == []
 
 
+def test_a_beginning_that_never_left_does_not_outlive_the_lifespan():
+    """As the radio or the whole process stood still: the first burst came too late, or not yet."""
+    for comes_back in (True, False):
+        link = make_link(pdu_size=64)
+        link.submit(0, bytes(200), 0.0, Overrides(lifespan_s=0.4))
+        burst = compose(link, 0.3, 2)
+        if comes_back:
+            link.confirm(burst, Outcome.LATE, 0.8)
+        assert compose(link, 3.0, 8) is None
+        if not comes_back:
+            link.confirm(burst, Outcome.LATE, 3.0)
+        assert dropped(link) == {("odom", "tx_expired"): 1}
+        assert not link.has_work
+        assert link.audit() == []
+
+
 @pytest.mark.parametrize(
     ("policy", "qos"), [(TopicPolicy(deadman_s=1.0), None), (TopicPolicy(), Qos.URGENT)]
 )

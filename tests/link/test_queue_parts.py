@@ -48,16 +48,11 @@ from sdrlinkd.wire import (
     part_size,
 )
 from tests.laws import law
+from tests.link.world import outgoing
 
 ENTRY, WITH_AGE = 5, 13
 """Octets that a message takes besides its own: alone, and with its age."""
 PLENTY = QueueParams(max_messages=10_000, max_bytes=1 << 30, max_airtime_s=inf)
-
-
-def outgoing(
-    size=10, qos=Qos.DEFAULT, priority=64, topic_id=0, dst=255, at=0.0, until=inf, **more
-):  # fmt: skip
-    return Outgoing(topic_id, bytes(size), qos, priority, dst, at, until, False, TxTally(), **more)
 
 
 @pytest.mark.parametrize(

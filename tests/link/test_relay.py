@@ -56,6 +56,26 @@ def test_a_message_crosses_a_chain_and_its_age_adds_up():
     assert two.audit() == three.audit() == four.audit() == []
 
 
+@pytest.mark.parametrize(("deadman_s", "arrives"), [(0.0, True), (1.0, False)])
+def test_what_has_begun_in_time_crosses_a_chain_after_its_lifespan_except_commands(
+    deadman_s, arrives
+):
+    one, two, three = node(1), node(2, "1>3"), node(3)
+    for link in (one, two, three):
+        link.set_policies({0: TopicPolicy(lifespan_s=0.2, deadman_s=deadman_s)})
+    one.submit(0, bytes(200), 0.0, Overrides(dst=3))
+    heard = []
+    for now in (0.05, 0.15, 0.25, 0.35, 0.45):
+        if burst := compose(one, now, 1):
+            one.confirm(burst, Outcome.SENT, now)
+            for pdu in burst.pdus:
+                assert two.hear(pdu, now) == []
+        for pdu in pass_on(two, now + 0.01):
+            heard += three.hear(pdu, now + 0.02)
+    assert [message.payload for message in heard] == [bytes(200)] * arrives
+    assert one.audit() == two.audit() == three.audit() == []
+
+
 def test_what_a_relay_sends_on_is_known_to_who_heard_it_before():
     """STAMPs grow on the way; duplicates are recognised by the constant parts."""
     one, two, three = node(1), node(2, "any>all"), node(3)

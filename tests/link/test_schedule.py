@@ -146,6 +146,13 @@ def test_when_no_pdu_fits_before_what_is_due_the_air_is_kept_free():
     assert due_at < allowance.until < due_at + PDU_S
 
 
+def test_nothing_is_waited_for_whose_time_is_over():
+    """A link that is asked again at that very time would be asked for ever."""
+    forecasts, due_at = learned()
+    until = allow(forecasts, due_at - 0.3 * PDU_S).until
+    assert allow(forecasts, until).most[Qos.BULK] > 0
+
+
 def test_the_air_is_kept_free_for_a_tenth_of_the_time_at_most():
     """With fifteen topics, so that something is always due."""
     forecasts = Forecasts()
@@ -274,7 +281,7 @@ def test_allowance_may_be_cut_for_less_urgent_classes():
 def test_made_up_robots_are_forgotten():
     forecasts = Forecasts()
     for i in range(5000):
-        for since in (0.0, 10.0, 20.0):
+        for since in (0.0, 5.0, 10.0, 15.0, 20.0):
             forecasts.note(Flow(i, i, 0), Qos.LATENCY, since + 0.001 * i)
     kept = {node for node, _ in forecasts.of_team(25.0, 40.0)}
     assert kept == set(range(5000 - 128, 5000))

@@ -23,10 +23,14 @@ def pass_time(link, n, rate_hz, begin=0.0):
 
 def test_a_throttled_topic():
     link = make_link(pdu_size=64)
-    link.set_policies({0: TopicPolicy(period_s=0.1, qos="latency", lifespan_s=0.3)})
+    policy = TopicPolicy(period_s=0.1, qos="latency", lifespan_s=0.3, weight=2)
+    link.set_policies({0: policy})
     now = pass_time(link, 500, 50)
     assert link.why(0, FILE, now) == [
-        "odom: class latency, priority 64, to everyone, lifespan 300 ms (etc/sdrlinkd.toml)",
+        (
+            "odom: class latency, priority 64, to everyone, weight 2, lifespan 300 ms "
+            "(etc/sdrlinkd.toml)"
+        ),
         "last minute: 500 messages in, 100 sent (20 %)",
         "80 % throttled to 10 Hz by etc/sdrlinkd.toml (tx_throttled, 400)",
     ]

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from itertools import count
+from math import inf
 from random import Random
 
 import msgspec
@@ -17,12 +18,14 @@ from sdrlinkd.link import (
     Opportunity,
     Outcome,
     PduLinkTraits,
+    Qos,
     QueueParams,
     RateParams,
     ReassemblyParams,
     RelayParams,
     RepeatParams,
 )
+from sdrlinkd.link.queue import Outgoing, TxTally
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
@@ -84,6 +87,13 @@ def make_link(
     )
     link.attach(traits or PduLinkTraits(), AccessParams(), RateParams())
     return link
+
+
+def outgoing(
+    size=10, qos=Qos.DEFAULT, priority=64, topic_id=0, dst=255, at=0.0, until=inf, **more
+):  # fmt: skip
+    """A message for the queue."""
+    return Outgoing(topic_id, bytes(size), qos, priority, dst, at, until, False, TxTally(), **more)
 
 
 def compose(link, now, max_pdus=MAX_PDUS):

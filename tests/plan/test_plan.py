@@ -36,6 +36,21 @@ def test_shares_of_the_air_are_those_of_the_modem():
     assert plan.air == pytest.approx(scan.air + image.air)
 
 
+def test_a_topic_below_its_share_has_a_bound_whatever_its_equals_offer():
+    policies = {0: TopicPolicy(), 5: TopicPolicy()}
+    alone, beside, worse = (
+        planned("scan:10:1KB", *more, policies=policies).topics[0].worst_s
+        for more in ((), ("map:50:64KiB",), ("map:500:64KiB",))
+    )
+    assert alone < beside == worse < 0.2
+    heavy = planned("scan:10:1KB", "map:50:64KiB", policies=policies)
+    assert heavy.topics[1].worst_s == float("inf")
+    assert not heavy.is_feasible
+    light = TopicPolicy(weight=0.01)
+    starved = planned("scan:10:1KB", "map:50:64KiB", policies={0: light, 5: TopicPolicy()})
+    assert starved.topics[0].worst_s == float("inf"), "its share is too small"
+
+
 def test_what_is_more_urgent_waits_less_and_more_load_lets_others_wait_longer():
     few, many = planned("scan:10:1KB", "map:5:64KiB"), planned("scan:80:1KB", "map:5:64KiB")
     for plan in (few, many):

@@ -236,10 +236,11 @@ class Composer:
             self._piggyback.ride(draft, start, self.next_number)
         if self._bare.untold:
             self._bare.ride(draft, self.next_number)
-        rest = room - draft.charged - (unused - draft.room)
-        for message in draft.carried:
+        if draft.carried:
             # Ages, and what the PDU leaves unused, are air, too.
-            message.owe(rest / len(draft.carried))
+            rest = (room - draft.charged - (unused - draft.room)) / len(draft.carried)
+            for message in draft.carried:
+                message.owe(rest)
         return self._finish(draft, self.next_number)
 
     def _next_full(self, start: float, most: int, source: int | None) -> list[BuiltPdu]:

@@ -55,9 +55,8 @@ class Level:
         """Add a lane whose first message is `head`."""
         account = lane.account
         if not account.lanes:
-            spent = account.spent + account.owed / account.weight
-            account.spent = max(spent, self._now - self._head_start / account.weight)
-            account.owed = 0.0
+            account.pay()
+            account.catch_up(self._now - self._head_start / account.weight)
         account.lanes.append(lane)
         self._place(lane, head)
         self.per_dst[lane.dst] = self.per_dst.get(lane.dst, 0) + 1
@@ -76,27 +75,34 @@ class Level:
     def charge(self, account: Account, octets: float) -> None:
         """Charge a topic for octets that it sent, and move its lanes back accordingly."""
         self._now = max(self._now, account.spent)
-        account.spent += (octets + account.owed) / account.weight
-        account.owed = 0.0
+        account.pay(octets)
         for lane in account.lanes:
             self.move(lane)
         # A topic that could not be served has saved up no more than one that had nothing to send.
         while self.lanes and (first := self.lanes[0].account).spent < (
             least := self._now - 2 * self._head_start / first.weight
         ):
-            first.spent = least
+            first.catch_up(least)
             for lane in tuple(first.lanes):
                 self.move(lane)
 
     def move(self, lane: Lane) -> None:
         """Put a lane in its place by what its account and its first message are now."""
-        if lane.head is not None:
-            self._displace(lane)
-            self._place(lane, lane.head)
+        head = lane.head
+        if head is None:
+            return
+        if len(self.lanes) == 1:
+            lane.order = self._rank(lane, head)
+            return
+        self._displace(lane)
+        self._place(lane, head)
+
+    def _rank(self, lane: Lane, head: Outgoing) -> tuple[float, float, int]:
+        self._turn += 1
+        return lane.account.spent, head.expires_at, self._turn
 
     def _place(self, lane: Lane, head: Outgoing) -> None:
-        self._turn += 1
-        lane.order = (lane.account.spent, head.expires_at, self._turn)
+        lane.order = self._rank(lane, head)
         insort(self.lanes, lane, key=_order)
 
     def _displace(self, lane: Lane) -> None:

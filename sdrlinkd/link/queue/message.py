@@ -53,9 +53,9 @@ class Outgoing:
         `receipt` is the producer's id for the receipt, empty if none is wanted, and `key` its
         producer key. `number` is the topic's number on the air if that is not `topic_id`. `parting`
         says how to divide a large message, whose parts are cut one after the other. `is_command`
-        means that its lifespan ends even if it has begun. `is_whole`
-        means that the payload is another robot's PDU to be relayed, with `pdu_number` if known;
-        `is_bare`, that this PDU holds only control records.
+        means that it is dropped at the end of its lifespan even if it has begun; `is_whole`, that
+        the payload is another robot's PDU to be relayed, with `pdu_number` if known; `is_bare`,
+        that this PDU holds only control records.
         """
         self.topic_id = topic_id
         self.payload = payload
@@ -96,7 +96,7 @@ class Outgoing:
         self.held_ids: tuple[int, ...] = ()
         """Those held, as fragments leave later than planned."""
         self.has_left = False
-        """Whether the radio has reported that a part of the message left."""
+        """Whether the radio has reported that a PDU with a part of the message left."""
         self.unconfirmed = 0
         """Number of PDUs with a part of the message whose outcome the radio has not reported."""
         self.parity: list[bytes] = []
@@ -135,12 +135,18 @@ class Outgoing:
 
     @property
     def worth_until(self) -> float:
-        """When it is no longer worth sending.
+        """When PDUs with parts of it are no longer worth sending.
 
-        A lifespan decides whether sending begins: what has begun is finished, except a command. A
-        message that needs more airtime than its lifespan would never arrive otherwise.
+        A lifespan decides whether a message begins: what has begun is finished, except a command. A
+        message that needs more airtime than its lifespan would never arrive otherwise. A PDU that
+        was held back does not count as a beginning.
         """
-        return inf if self.has_left and not self.is_command else self.expires_at
+        return inf if self._is_to_be_finished and self.has_left else self.expires_at
+
+    @property
+    def _is_to_be_finished(self) -> bool:
+        """Whether it has begun, and more than one PDU carries it."""
+        return self.rests_id and not self.is_command
 
     def in_vain(self, now: float, patience_s: float) -> str:
         """The ledger's reason to stop sending the message; empty while it is worth sending.
@@ -150,9 +156,12 @@ class Outgoing:
         """
         if self.parity:
             return ""
-        if self.worth_until <= now:
+        is_stalled = self.k > 0 and now > self.last_at + patience_s
+        # A beginning that was only planned does not outlive a pause.
+        goes_on = self._is_to_be_finished and (self.has_left or not is_stalled)
+        if self.expires_at <= now and not goes_on:
             return "tx_expired"
-        return "tx_stalled" if self.k and now > self.last_at + patience_s else ""
+        return "tx_stalled" if is_stalled else ""
 
     def step(self, step: Step) -> bool:
         """Take a step; False, without a change, if STEPS does not contain it."""
@@ -221,12 +230,12 @@ class Outgoing:
 
     def owe(self, octets: float) -> None:
         """Charge its topic for octets that do not come from the queue, when it is served next."""
-        self.lane.account.owed += octets
+        self.lane.account.owe(octets)
 
     def confirm(self, *, has_left: bool) -> None:
         """Note that the radio has reported the outcome of one PDU with a part of the message."""
         self.unconfirmed -= 1
-        self.has_left = self.has_left or (has_left and self.rests_id)
+        self.has_left = self.has_left or has_left
 
     def _next_body(self) -> None:
         if self._parting is not None:
@@ -248,6 +257,19 @@ class Account:
         """Octets that are charged when the topic is served next."""
         self.lanes: list[Lane] = []
         """The topic's lanes that have something to send."""
+
+    def owe(self, octets: float) -> None:
+        """Charge octets when the topic is served next: to sort it in at once costs too much."""
+        self.owed += octets
+
+    def pay(self, octets: float = 0.0) -> None:
+        """Charge octets, and those that are owed."""
+        self.spent += (octets + self.owed) / self.weight
+        self.owed = 0.0
+
+    def catch_up(self, least: float) -> None:
+        """Forget what was saved up beyond `least`."""
+        self.spent = max(self.spent, least)
 
 
 class Lane:

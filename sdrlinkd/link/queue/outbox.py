@@ -205,16 +205,14 @@ class Outbox:
 
     def _enqueue(self, message: Outgoing, weight: float) -> None:
         key = (message.qos, -message.priority, message.topic_id, message.dst)
-        lane = self._lanes.get(key)
+        lane, level = self._lanes.get(key), self._level(key[:2])
+        is_new = lane is None
         if lane is None:
-            level = self._level(key[:2])
             lane = self._lanes[key] = level.lane(message.topic_id, message.dst)
-            lane.waiting.append(message)
-            lane.account.weight = weight
+        lane.account.weight = weight
+        lane.waiting.append(message)
+        if is_new:
             level.add(lane, message)
-        else:
-            lane.waiting.append(message)
-            lane.account.weight = weight
         message.enter(lane)
         self.relays = self.relays or message.is_whole
         self._by_class[message.qos][message] = None

@@ -39,7 +39,7 @@ class RepeatGroup(NamedTuple):
         return self._replace(kept=sorted(self.kept[:n], key=lambda kept: kept.number))
 
     def alive(self, start: float) -> "RepeatGroup":
-        """Those that hold a message that is not too old at `start`."""
+        """Those that hold a message that is worth sending at `start`."""
         return self._replace(kept=[kept for kept in self.kept if kept.worth_until() > start])
 
     def told(self, start: float, room: int) -> tuple[list[Repeat], "RepeatGroup"]:

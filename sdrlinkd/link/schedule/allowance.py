@@ -113,6 +113,7 @@ class Limits:
                 n = self._before(free_s, 2 * due.spread_s + notice_s, n, airtime_s, overrun)
                 passed_at = due.due(known) + due.spread_s + notice_s
                 if n == 0 and passed_at <= start:
+                    # There is nothing to wait for any more.
                     n = 1
                 elif n == 0 and until == inf:
                     until = passed_at

@@ -10,18 +10,19 @@ from sdrlinkd.link.qos import Qos
 
 MEMORY = 16
 """Number of messages that a forecast is made from."""
-LEARNED = 3
+LEARNED = 5
 """Number of messages from which a period is trusted."""
-STEADY = 0.18
+STEADY = 0.16
 """Largest mean distance of a periodic topic's steps from a number of periods, in periods."""
 NEAR = 0.25
 """Distance of a step from the period, in periods, up to which it is one period long."""
 FEW = 7
-"""Number of the last messages that tell of a new rate, if their steps are more EVEN than STEADY."""
+"""Number of the last messages that tell of another rate, if their steps are EVEN."""
 EVEN = 0.05
+"""STEADY for FEW messages, as these may seem to be periodic by chance."""
 ODD = 6
-"""Distance of a step from the period after which the phase is another one, in the median
-distance."""
+"""Distance of a step from the period from which on the phase is another one, as a multiple of the
+median distance."""
 FASTEST_S = 0.002
 """Shortest period in s for which airtime is kept free."""
 MISSED = 3
@@ -55,8 +56,8 @@ class Forecast:
     Both are computed from the last MEMORY messages alone: the period from the steps between them
     that are about one period long, the phase from the messages since the last step that was not.
     What misleads a forecast is soon gone: a pause with the first message after it, lost and late
-    messages at once, another rate with half of MEMORY, or all
-    of it if it differs by less than NEAR.
+    messages at once, another rate with half of MEMORY messages, or with all of them if the rates
+    differ by less than NEAR.
     """
 
     __slots__ = ("_line", "_times", "n_pdus", "qos")

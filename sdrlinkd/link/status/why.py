@@ -92,6 +92,8 @@ class Why:
         dst = self._intake.destination(topic_id)
         to = "everyone" if dst == BROADCAST else f"robot {dst}"
         line = f"{name}: class {policy.qos}, priority {policy.priority}, to {to}"
+        if policy.weight != 1:
+            line += f", weight {policy.weight:g}"
         if policy.kept:
             line += f", depth {policy.kept}"
         lifespan = self._intake.lifespan(topic_id)
