@@ -44,7 +44,8 @@ def test_the_whole_of_table_6(tmp_path, capsys):
     for result in (ofdm, iqfile):
         heard = result["phy"]
         assert (heard["mcs"], heard["channel"]) == ("QPSK 1/2", "awgn")
-        assert heard["pdus_good"] == result["pdus_sent"]
+        # The last beacon may have been heard, while its sender does not know yet that it left.
+        assert heard["pdus_good"] - result["pdus_sent"] in (0, 1)
         assert heard["pdus_bad"] == heard["headers_bad"] == 0
         assert 14 < heard["snr_db_measured"] < 16
     for name in ("latency_cdf.png", "path.png"):
