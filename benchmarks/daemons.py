@@ -90,7 +90,7 @@ def running(
             if precede:
                 processes.precede(started[-1], real_time=False)
         folders = {robot: folder / str(robot) for robot in robots}
-        _wait_for(folders, started, ready)
+        wait_for(folders, started, ready)
         yield Running(folders, folder / "air", started)
 
 
@@ -104,13 +104,14 @@ def daemon_at_work(config: Path, tree: Path = ROOT) -> Iterator[Path]:
         daemon = processes.start_module(
             stack, "daemon", "sdrlinkd", "--config", str(config), *QUIET, tree=tree
         )
-        _wait_for({1: config.parent}, [daemon], is_up)
+        wait_for({1: config.parent}, [daemon], is_up)
         yield config.parent
 
 
-def _wait_for(
+def wait_for(
     folders: dict[int, Path], started: list[Process], ready: Callable[[ControlClient], bool]
 ) -> None:
+    """Wait until all daemons are `ready`. Raises PeerError, with what the programs have logged."""
     waiting = list(folders.values())
 
     def are_ready() -> bool:

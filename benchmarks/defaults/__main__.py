@@ -6,8 +6,13 @@ import sys
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from random import Random
+from statistics import mean, pstdev
+from typing import Literal
 
-from benchmarks.defaults.team import Drive, Flow, drive
+from backends import Outage
+from benchmarks.defaults.daemons import RATE, drive_daemons
+from benchmarks.defaults.fairness import fairness_rows
+from benchmarks.defaults.team import LISTENER, Air, Drive, Flow, drive
 from benchmarks.report import Row, main
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.wire import equal_payload
@@ -17,6 +22,24 @@ ODOM, IMAGE, CLOUD = "nav_msgs/msg/Odometry", "sensor_msgs/msg/Image", "sensor_m
 ODOM_SIZE, ODOM_HZ = 724, 30.0
 BIG = ((IMAGE, 200_000, 5.0), (IMAGE, 1_000_000, 2.0), (CLOUD, 3_000_000, 10.0))
 """Type, bytes and messages per s of topics that alone exceed the channel's 5.8 Mbit/s."""
+SCAN, TWIST, STRING = "sensor_msgs/msg/LaserScan", "geometry_msgs/msg/Twist", "std_msgs/msg/String"
+LASER_SIZE, LASER_HZ, PICTURE_SIZE, PICTURE_S = 1024, 50.0, 64_000, 0.15
+LASERS = 25
+"""Lasers between two pauses."""
+LEARNED_WITHIN = 4
+"""Messages after which the laser is to be foreseen again."""
+LARGE: tuple[tuple[int, Literal["reliable", "best_effort"]], ...] = (
+    (400_000, "best_effort"), (1_500_000, "reliable"),
+)  # fmt: skip
+LARGE_HZ = 0.35
+HALF_DUPLEX = Air(is_half_duplex=True)
+SEED_AIRS = {
+    "1ch": HALF_DUPLEX, "full_duplex": Air(), "1ch_adaptive": Air(None, is_half_duplex=True),
+}  # fmt: skip
+LONG_S = 20.0
+DAEMONS_MCS = 6
+"""64QAM 3/4, which carries as much at 2 Msps as 16QAM 1/2 at 5 Msps."""
+DAEMONS_TOLD = f"as init writes it; overridden: {RATE}, MCS {DAEMONS_MCS}, fixed"
 LEAST_BIT_S = 1.2e6
 """Rate at which one message of such a topic is to arrive within the drive."""
 LATE_S = 1.0
@@ -26,10 +49,12 @@ LATE_S = 1.0
 def measure(seed: int, quick: bool, before: Path | None = None) -> Iterator[Row]:
     """Measure all rows; `quick` drives for a fifth of the time."""
     known = {} if before is None else _values(before)
-    for row in _rows(seed, 4.0 if quick else 20.0):
+    duration_s = 4.0 if quick else 20.0
+    for row in _rows(seed, duration_s):
         row.exact = True
         row.peers = {"before": known[row.name]} if row.name in known else {}
         yield row
+    yield from _whole(duration_s)
 
 
 def _values(path: Path) -> dict[str, float]:
@@ -42,6 +67,44 @@ def _rows(seed: int, duration_s: float) -> Iterator[Row]:
         yield from _beside(kind, size, hz, max(duration_s, 8 * size / LEAST_BIT_S), seed)
     yield from _large(seed)
     yield from _alone(seed)
+    yield from _seed_workload(seed, duration_s)
+    yield from _pauses(seed, 10 if duration_s < LONG_S else 100)
+    yield from _outage(seed)
+    yield from _depths(seed)
+    yield from fairness_rows(seed, 30 if duration_s < LONG_S else 300)
+
+
+def _whole(duration_s: float) -> Iterator[Row]:
+    """Three of these rows with whole daemons in real time, on as many cores as there are."""
+    odom = Flow("odom", ODOM, ODOM_SIZE, _times(ODOM_HZ, duration_s, Random(1)))
+    kind, size, hz = BIG[0]
+    big = Flow("big", kind, size, _times(hz, duration_s, Random(2)))
+    note = f"two daemons and a hub, {DAEMONS_TOLD}"
+    ages = drive_daemons([odom, big], DAEMONS_MCS)
+    n, ages_s = len(odom.times), ages["odom"]
+    yield Row("daemons_odom_beside_200kB_pct", 100 * len(ages_s) / n, "%", 100, "more", n,
+              note=note)  # fmt: skip
+    for share, target in ((0.5, 20.0), (0.99, 60.0)):
+        age_ms = 1e3 * _quantile(ages_s.values(), share)
+        yield Row(f"daemons_odom_beside_200kB_p{100 * share:.0f}_ms", age_ms, "ms", target, "less",
+                  n, note=note)  # fmt: skip
+    size, offer = LARGE[0]
+    times = [BEGIN_S + i / LARGE_HZ for i in range(4)]
+    ages = drive_daemons([Flow("big", CLOUD, size, times, offer)], DAEMONS_MCS, 5.0)
+    yield Row(f"daemons_{_sized(size)}_{offer}", len(ages["big"]), "of 4", 4, "more", 4, note=note)
+    laser = Flow("scan", SCAN, LASER_SIZE, _times(LASER_HZ, duration_s, Random(3)))
+    image = Flow("image", IMAGE, PICTURE_SIZE, _times(1 / PICTURE_S, duration_s, Random(4)))
+    ages = drive_daemons([laser, image], DAEMONS_MCS)
+    lasers_s, images_s = ages["scan"].values(), ages["image"].values()
+    n, m = len(laser.times), len(image.times)
+    for row, value, unit in (
+        ("laser_ms", 1e3 * mean(lasers_s), "ms"), ("laser_std_ms", 1e3 * pstdev(lasers_s), "ms"),
+        ("laser_p99_ms", 1e3 * _quantile(lasers_s, 0.99), "ms"),
+        ("laser_pct", 100 * len(lasers_s) / n, "%"), ("image_ms", 1e3 * mean(images_s), "ms"),
+        ("image_pct", 100 * len(images_s) / m, "%"),
+    ):  # fmt: skip
+        yield Row(f"daemons_{row}", value, unit, None, "more" if unit == "%" else "less",
+                  n if "laser" in row else m, note=note)  # fmt: skip
 
 
 def _beside(kind: str, size: int, hz: float, duration_s: float, seed: int) -> Iterator[Row]:
@@ -67,11 +130,10 @@ def _beside(kind: str, size: int, hz: float, duration_s: float, seed: int) -> It
 
 def _large(seed: int) -> Iterator[Row]:
     """Messages that take longer on the air than their lifespan."""
-    for size, hz, is_reliable in ((400_000, 0.35, False), (1_500_000, 0.35, True)):
-        times = [BEGIN_S + i / hz for i in range(4)]
-        found = drive([Flow("big", CLOUD, size, times, is_reliable)], times[-1] + 10, seed)
+    for size, offer in LARGE:
+        times = [BEGIN_S + i / LARGE_HZ for i in range(4)]
+        found = drive([Flow("big", CLOUD, size, times, offer)], times[-1] + 10, seed)
         arrived = len(found.ages_s["big"])
-        offer = "reliable" if is_reliable else "best_effort"
         yield Row(f"{_sized(size)}_{offer}", arrived, "of 4", 4, "more", 4, note=_told(found))
 
 
@@ -82,6 +144,93 @@ def _alone(seed: int) -> Iterator[Row]:
         age_s = found.ages_s["big"].get(0, float("inf"))
         share = 100 * 8 * size / age_s / _capacity_bit_s(found)
         yield Row(f"alone_{_sized(size)}_pct", share, "%", 90, "more", 1, note=_told(found))
+
+
+def _seed_workload(seed: int, duration_s: float) -> Iterator[Row]:
+    """Pound's laser and image between two robots."""
+    for name, air in SEED_AIRS.items():
+        laser = Flow("scan", SCAN, LASER_SIZE, _times(LASER_HZ, duration_s, Random(seed)))
+        image = Flow("image", IMAGE, PICTURE_SIZE, _times(1 / PICTURE_S, duration_s, Random(seed)))
+        until_s = BEGIN_S + duration_s
+        found = drive([laser, image], until_s, seed, air)
+        lasers_s, images_s = found.ages_s["scan"], found.ages_s["image"]
+        due = [i for i, at in enumerate(image.times) if at < until_s - LATE_S]
+        arrived = 100 * sum(i in images_s for i in due) / len(due)
+        has_target = air == HALF_DUPLEX
+        for row, value, unit, target in (
+            ("laser", 1e3 * mean(lasers_s.values()), "ms", 4.5),
+            ("laser_std", 1e3 * pstdev(lasers_s.values()), "ms", 1.0),
+            ("laser_p99", 1e3 * _quantile(lasers_s.values(), 0.99), "ms", None),
+            ("image", 1e3 * mean(images_s.values()), "ms", 170.0),
+            ("image_pct", arrived, "%", 99.9),
+        ):
+            better: Literal["more", "less"] = "more" if unit == "%" else "less"
+            n = len(due) if "image" in row else len(lasers_s)
+            yield Row(f"{row}_{name}", value, unit, target if has_target else None, better, n,
+                      note=_told(found))  # fmt: skip
+
+
+def _pauses(seed: int, n_pauses: int) -> Iterator[Row]:
+    """The same workload, whose laser pauses once for 22 s, or again and again."""
+    rng = Random(seed)
+    many_s = [10 ** rng.uniform(-1, 1.5) for _ in range(n_pauses)]
+    for name, pauses_s in (("22s", [22.0]), (f"each_of_{n_pauses}", many_s)):
+        times, before, after = list[float](), set[int](), set[int]()
+        at = BEGIN_S
+        for pause_s in (0.0, *pauses_s):
+            at += pause_s
+            first = len(times)
+            times += [at + i / LASER_HZ for i in range(LASERS)]
+            (after if pause_s else before).update(range(first + LEARNED_WITHIN, first + LASERS))
+            at = times[-1] + 1 / LASER_HZ
+        laser = Flow("scan", SCAN, LASER_SIZE, times)
+        image = Flow("image", IMAGE, PICTURE_SIZE, _times(1 / PICTURE_S, at - BEGIN_S, rng))
+        found = drive([laser, image], at + 1.0, seed, HALF_DUPLEX)
+        ages_s = found.ages_s["scan"]
+        before_s, after_s = ([ages_s[i] for i in each if i in ages_s] for each in (before, after))
+        note, n = _told(found), len(after_s)
+        ratio = mean(after_s) / mean(before_s)
+        yield Row(f"laser_after_{name}_over_before", ratio, "", 1.1, "less", n, note=note)
+        p99_ms = 1e3 * _quantile(after_s, 0.99)
+        yield Row(f"laser_after_{name}_p99_ms", p99_ms, "ms", None, "less", n, note=note)
+
+
+def _outage(seed: int) -> Iterator[Row]:
+    """The radio is away for a minute while the robot goes on; what arrives then."""
+    away = Outage(BEGIN_S + 2, BEGIN_S + 62)
+    until_s = away.end_s + 3
+    flows = [
+        Flow(name, kind, size, _times(hz, until_s - BEGIN_S, Random(seed)), to=to)
+        for name, kind, size, hz, to in (
+            ("odom", ODOM, ODOM_SIZE, ODOM_HZ, None), ("scan", SCAN, 1500, 10.0, None),
+            ("cmd_vel", TWIST, 52, 20.0, LISTENER),
+        )
+    ]  # fmt: skip
+    found = drive(flows, until_s, seed, Air(silent=away))
+    note, oldest_s = _told(found), 0.0
+    for flow in flows:
+        ages_s = found.ages_s[flow.name]
+        later = {flow.times[i] + age_s: age_s for i, age_s in ages_s.items()}
+        later = {at: age_s for at, age_s in later.items() if at > away.end_s}
+        yield Row(f"outage_first_{flow.name}_s", later[min(later)], "s", 0.1, "less", 1, note=note)
+        oldest_s = max(oldest_s, *later.values())
+    yield Row("outage_oldest_s", oldest_s, "s", 0.3, "less", len(flows), note=note)
+
+
+def _depths(seed: int) -> Iterator[Row]:
+    """Histories as ROS 2 keeps them."""
+    late = Outage(0.0, BEGIN_S + 4)
+    latched = [BEGIN_S + i / 10 for i in range(5)]
+    often = sorted(2 * [BEGIN_S + i / 20 for i in range(100)])
+    for name, flow, air in (
+        ("latched_depth_5", Flow("x", STRING, 200, latched, "reliable", "transient_local", 5),
+         Air(unheard=late)),
+        ("50_reliable_at_once", Flow("x", STRING, 200, [BEGIN_S] * 50), Air()),
+        ("two_best_effort", Flow("x", STRING, 200, often, "best_effort"), Air()),
+    ):  # fmt: skip
+        found = drive([flow], flow.times[-1] + 20, seed, air)
+        arrived, n = len(found.ages_s["x"]), len(flow.times)
+        yield Row(name, arrived, f"of {n}", n, "more", n, note=_told(found))
 
 
 def _times(hz: float, duration_s: float, rng: Random) -> Sequence[float]:
@@ -108,7 +257,8 @@ def _sized(size: int) -> str:
 
 def _told(found: Drive) -> str:
     modem = found.config.modem
-    return f"{modem.rate_hz / 1e6:g} Msps as init writes it; overridden: MCS {modem.mcs}"
+    mcs = "the MCS adapts" if found.config.rate.adapt else f"overridden: MCS {modem.mcs}, fixed"
+    return f"{modem.rate_hz / 1e6:g} Msps as init writes it; {mcs}"
 
 
 def _options() -> argparse.ArgumentParser:
