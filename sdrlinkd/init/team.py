@@ -9,6 +9,9 @@ from sdrlinkd.init.choosing import FoundTopic
 from sdrlinkd.init.radios import RadioPreset
 
 REGISTRY, KEYS = "registry.csv", "keys.toml"
+PDU_SIZE = 1100
+SLOWEST_MCS = 1
+_LISTED = "sdrlinkctl phy info lists them"
 
 
 class Team(NamedTuple):
@@ -53,6 +56,8 @@ def _registry(topics: list[FoundTopic]) -> str:
 def _config(team: Team, number: int, has_neighbors: bool) -> str:
     radio, name = team.radio, f"robot_{number}"
     parts = [_head(team, number)]
+    told = "a message of 1 KB fits with its age, also sealed; the same at all robots"
+    parts.append("[link]\n" + _line(f"pdu_size = {PDU_SIZE}", told))
     if radio.backend != "direct":
         parts.append(_modem(team))
     if radio.is_real:
@@ -65,6 +70,7 @@ def _config(team: Team, number: int, has_neighbors: bool) -> str:
     if radio.backend == "ether":
         parts.append("[ether]\n" + _hub(team))
     if radio.shares_air and team.robots > 1:
+        parts.append(_rate())
         parts.append(_access(team))
     if team.is_sealed:
         parts.append(
@@ -101,8 +107,22 @@ def _modem(team: Team) -> str:
         lines.append(_line(f"oversampling = {radio.oversampling}", told))
     if radio.is_real:
         lines.append(_text("frequency_hz", team.frequency, "one that antenna and licence cover"))
-    lines.append(_line("mcs = 1", "QPSK 1/2; sdrlinkctl phy info lists them"))
+    if radio.shares_air and team.robots > 1:
+        told = f"QPSK 1/2, for a robot whose reports are missing; {_LISTED}"
+    else:
+        told = f"QPSK 1/2; {_LISTED}"
+    lines.append(_line(f"mcs = {SLOWEST_MCS}", told))
+    if radio.backend == "ether":
+        told = "robots in simulated time notice each other's bursts this soon"
+        lines.append(_line('block_s = "0.25 ms"', told))
     return "[modem]\n" + "".join(lines)
+
+
+def _rate() -> str:
+    return "[rate]\n" + "".join((
+        _line("adapt = true", "the fastest MCS that all who are to hear a burst can read"),
+        _line(f"min_mcs = {SLOWEST_MCS}", "0 reaches further, and makes every turn longer"),
+    ))  # fmt: skip
 
 
 def _access(team: Team) -> str:
