@@ -24,7 +24,7 @@ from sdrlinkd.adapters import (
 )
 from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import RuntimeDir, app, connect
-from sdrlinkd.client import MessageRefusedError, Publisher
+from sdrlinkd.client import MessageRefusedError, Publisher, RefusedError
 from sdrlinkd.errors import BagError, UserError
 from sdrlinkd.reports import TopicReport
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
@@ -38,6 +38,7 @@ COLUMNS = (
 
 CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
 SECOND_NS = 1_000_000_000
+NOT_CARRIED = "not a topic that the daemon carries"
 
 bags = typer.Typer(help="Recordings of messages.", no_args_is_help=True)
 app.add_typer(bags, name="bag")
@@ -105,7 +106,10 @@ def play(
     ] = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
-    """Play a recording to the daemon: rosbag2 verbatim, ROS 1 converted."""
+    """Play a recording to the daemon: rosbag2 verbatim, ROS 1 converted.
+
+    Topics that the daemon does not know are declared, if it takes them (auto = true).
+    """
     console = Console(stderr=True)
     opened = open_bag(bag)
     with connect(runtime_dir) as control:
@@ -114,8 +118,17 @@ def play(
             control.ask(
                 "declare", {"name": CLOCK, "type": CLOCK_TYPE, "reliability": "best_effort"}
             )
-    taken = {topic.name: topic for topic in snapshot.link.topics if topic.subscribed}
-    route, left_out = _route(opened.topics(), taken, snapshot.namespace, topics or [], remap or [])
+        taken = {topic.name: topic for topic in snapshot.link.topics if topic.subscribed}
+        route, left_out, unknown = _route(
+            opened.topics(), taken, snapshot.namespace, topics or [], remap or []
+        )
+        for topic, name in unknown.items():
+            try:
+                control.ask("declare", {"name": name, "type": topic.type})
+            except RefusedError:
+                left_out[topic.name] = NOT_CARRIED
+            else:
+                route[topic.name] = name
     for name, reason in left_out.items():
         console.print(f"left out: {name} ({reason})", style="yellow", markup=False)
     if not route:
@@ -179,8 +192,10 @@ def _route(
     namespace: str,
     only: list[str],
     remap: list[str],
-) -> tuple[dict[str, str], dict[str, str]]:
-    """({topic of the bag: the daemon's topic}, {topic left out: reason}). Raises UserError."""
+) -> tuple[dict[str, str], dict[str, str], dict[BagTopic, str]]:
+    """({topic of the bag: the daemon's topic}, {topic left out: reason}, {topic that the daemon
+    does not know: what it would be called there}). Raises UserError.
+    """
     mapping = {}
     for rule in remap:
         source, separator, target = rule.partition(":=")
@@ -194,6 +209,7 @@ def _route(
             raise UserError(f"got {name}; allowed: the bag's topics {', '.join(sorted(known))}")
     route: dict[str, str] = {}
     left_out: dict[str, str] = {}
+    unknown: dict[BagTopic, str] = {}
     for topic in topics:
         if only and not any(fnmatchcase(topic.name, each) for each in only):
             continue
@@ -202,12 +218,12 @@ def _route(
             candidates.append(f"/{namespace.strip('/')}{topic.name}")
         target = next((name for name in candidates if name in taken), "")
         if not target:
-            left_out[topic.name] = "not a topic that the daemon carries"
+            unknown[topic] = candidates[-1]
         elif taken[target].type != topic.type:
             left_out[topic.name] = f"type {topic.type}, but the registry has {taken[target].type}"
         else:
             route[topic.name] = target
-    return route, left_out
+    return route, left_out, unknown
 
 
 def _absolute(name: str) -> str:
