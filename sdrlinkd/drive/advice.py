@@ -19,6 +19,7 @@ REMEDIES = {
     "tx_topic_full": "send it less often, make it smaller, or raise its queue_bytes",
     "tx_overflow_old": "send less: sdrlinkctl plan says what fits",
     "tx_overflow_new": "send less: sdrlinkctl plan says what fits",
+    "tx_too_slow": "make it smaller, or give it a longer lifespan",
     "tx_stalled": "make it smaller, or raise its class",
     "tx_too_big": "make it smaller, or let producers declare topics (auto)",
     "tx_unknown_topic": "add it to the registry, or let producers declare topics (auto)",

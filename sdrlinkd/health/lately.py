@@ -4,7 +4,14 @@ from collections import deque
 
 from sdrlinkd.reports import RATE_WINDOW_S, Snapshot
 
-SHED = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_expired", "tx_stalled")
+SHED = (
+    "tx_overflow_old",
+    "tx_overflow_new",
+    "tx_topic_full",
+    "tx_expired",
+    "tx_too_slow",
+    "tx_stalled",
+)
 """Reasons of drops that more airtime would have prevented."""
 
 

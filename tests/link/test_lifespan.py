@@ -6,13 +6,14 @@ from sdrlinkd.config import parse_config
 from sdrlinkd.link import (
     ClassesParams,
     LatencyParams,
+    Opportunity,
     Outcome,
     Overrides,
     Qos,
     Told,
     TopicPolicy,
 )
-from tests.link.world import make_link, next_burst, send_all, tell, topic_of
+from tests.link.world import compose_at, make_link, next_burst, send_all, tell, topic_of
 
 INFINITE = float("inf")
 BY_CLASS = {Qos.URGENT: 1.0, Qos.LATENCY: 2.0, Qos.DEFAULT: INFINITE, Qos.BULK: INFINITE}
@@ -83,6 +84,34 @@ def test_what_the_producer_allows_holds_for_newcomers_too():
     for now in (60.0, 61.0, 62.0, 63.0):
         link.handle_timers(now)
     assert len(send_all(link, 63.0)) == 1
+
+
+@pytest.mark.parametrize(
+    ("qos", "size", "age_s", "ended"),
+    [
+        (Qos.URGENT, 29_000, 0.0, None),
+        (Qos.URGENT, 31_000, 0.0, "tx_too_slow"),
+        (Qos.URGENT, 21_000, 0.1, "tx_too_slow"),
+        # What is no command is finished once it has begun.
+        (Qos.LATENCY, 31_000, 0.0, None),
+    ],
+)
+def test_a_command_that_cannot_arrive_in_time_is_refused_at_once(qos, size, age_s, ended):
+    link = make_link(pdu_size=200)
+    compose_at(link, 100_000)
+    wishes = Overrides(qos=qos, lifespan_s=0.3, age_s=age_s)
+    assert link.submit(0, bytes(size), 1.0, wishes) == ended
+    why = link.why(0, FILE, 1.0)
+    assert any("the last one needs 0.8" in line for line in why) == (ended is not None)
+    assert link.audit() == []
+
+
+def test_a_beacon_at_the_slowest_rate_does_not_make_commands_too_slow():
+    link = make_link(pdu_size=200, beacon_s=1.0)
+    compose_at(link, 100_000)
+    slow = Opportunity(5.0, lambda _, n: n * 0.1, lambda *_: 8)
+    assert link.next_burst(slow) is not None, "a beacon"
+    assert link.submit(0, bytes(20_000), 5.0, Overrides(qos=Qos.URGENT, lifespan_s=0.3)) is None
 
 
 def test_nothing_changes_for_a_topic_that_nobody_configured():

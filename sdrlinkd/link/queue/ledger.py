@@ -22,6 +22,7 @@ TX_REASONS = {
     "tx_overflow_old": "shed from a full queue: oldest message of the lowest class",
     "tx_overflow_new": "refused by a full queue that holds only higher classes",
     "tx_expired": "its lifespan (its own, its topic's or its class's) ended before it was sent",
+    "tx_too_slow": "a command that takes longer on the air than its lifespan",
     "tx_stalled": "no fragment of it could be sent within the receivers' reassembly timeout",
     "tx_radio_down": "no radio to send it",
     "tx_radio_failed": "the radio reported an incomplete burst",

@@ -481,11 +481,12 @@ class BurstScheduler:
         )  # fmt: skip
         access, fit = self._access, self._fit
         asked = self._outbox.waiting_classes()
+        one_s, two_s = airtime_s(mcs, 1), airtime_s(mcs, 2)
+        # Bursts of records alone, such as beacons, are slower than those of messages.
+        if asked and two_s > one_s:
+            self.bytes_per_s = self._composer.k_single / (two_s - one_s)
         if further is not None:
             asked.add(further)
-        one_s, two_s = airtime_s(mcs, 1), airtime_s(mcs, 2)
-        if two_s > one_s:
-            self.bytes_per_s = self._composer.k_single / (two_s - one_s)
         most_s = longest_s if made_by is None else min(longest_s, max(one_s, made_by(slot.start)))
         if self._turns is not None:
             # Turns are short enough for what is urgent.
