@@ -7,11 +7,15 @@ import msgspec
 from msgspec import Meta
 
 from sdrlinkd.errors import DeclarationError
-from sdrlinkd.link import DEFAULT_POLICY, Offer, TopicPolicy
+from sdrlinkd.link import Offer, TopicPolicy
 from sdrlinkd.wire import HASH_SIZE
 
-BEST_EFFORT = TopicPolicy(depth=1, lifespan_s=0.5)
-RELIABLE = TopicPolicy(depth=10, lifespan_s=5.0)
+QUEUE_BYTES = 4 << 20
+"""Most bytes of a topic's messages that wait: a quarter of what the queue holds."""
+RELIABLE = TopicPolicy(depth=100, lifespan_s=5.0, queue_bytes=QUEUE_BYTES)
+BEST_EFFORT = TopicPolicy(depth=5, lifespan_s=0.5, queue_bytes=QUEUE_BYTES)
+"""Where the depth is unknown; that of SensorDataQoS."""
+MOST_LATCHED = 255
 _RIHS01 = re.compile(r"RIHS01_[0-9a-f]{64}")
 
 
@@ -28,8 +32,9 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True):
     """Reliability of the producer's QoS."""
     durability: Literal["volatile", "transient_local"] = "volatile"
     """Durability of the producer's QoS."""
-    depth: Annotated[int, Meta(ge=0, le=255)] = 1
-    """Messages of each producer that late joiners get, with transient_local."""
+    depth: Annotated[int, Meta(ge=0, le=10_000)] = 0
+    """Depth of the history of all producers without keys together; 0: unknown. With
+    transient_local, so many messages of each producer key are for late joiners, at most 255."""
 
     @property
     def is_latched(self) -> bool:
@@ -45,8 +50,14 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True):
     def policy(self) -> TopicPolicy:
         """The policy for a topic that nobody configured."""
         if self.is_latched:
-            return TopicPolicy(durability="transient_local", depth=max(1, self.depth))
-        return RELIABLE if self.reliability == "reliable" else BEST_EFFORT
+            return TopicPolicy(durability="transient_local", depth=self._latched)
+        offered = RELIABLE if self.reliability == "reliable" else BEST_EFFORT
+        return msgspec.structs.replace(offered, depth=self.depth or offered.depth)
+
+    @property
+    def _latched(self) -> int:
+        """How many messages of each producer late joiners get."""
+        return max(1, min(self.depth, MOST_LATCHED)) if self.is_latched else 0
 
     def joined(self, other: "Declaration") -> "Declaration":
         """The offer of two producers of one topic: the stronger one of each."""
@@ -73,18 +84,6 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True):
             name,
             self.type,
             hash_ or bytes(HASH_SIZE),
-            max(1, self.depth) if self.is_latched else 0,
+            self._latched,
             self.reliability == "best_effort",
         )
-
-
-def merged(configured: TopicPolicy, offered: TopicPolicy) -> TopicPolicy:
-    """The configured policy, with the keys that have their default value as offered."""
-    if not configured.offer:
-        return configured
-    left = {
-        key: getattr(offered, key)
-        for key in TopicPolicy.__struct_fields__
-        if getattr(configured, key) == getattr(DEFAULT_POLICY, key)
-    }
-    return msgspec.structs.replace(configured, **left)

@@ -8,13 +8,13 @@ import msgspec
 
 from sdrlinkd.config import Setup, explain_policy
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import DEFAULT_POLICY, Link, Told, TopicPolicy
-from sdrlinkd.offers import Declaration, merged
-from sdrlinkd.wire import Registry, read_origin
+from sdrlinkd.link import DEFAULT_POLICY, Link, PolicyTable, Told, TopicPolicy
+from sdrlinkd.offers import Declaration
+from sdrlinkd.wire import Registry, Topic, read_origin
 
 log = logging.getLogger("sdrlinkd")
 
-FIXED = ("dictionary", "from_", "offer", "stamp", "stop", "unproven")
+FIXED = ("dictionary", "from_", "key", "offer", "stamp", "stop", "unproven")
 """Keys that cannot be changed at run time: receivers must know two of them, the stop message is
 made at the start, what is set wins over an offer anyway, and whom to trust is for the file."""
 
@@ -33,13 +33,13 @@ class Policies:
         """Called with the policies in force after a change."""
         self._offers: dict[int, Declaration] = {}
         """What the producers of a topic said of its QoS, by topic id."""
-        self._configured: Mapping[str, TopicPolicy] = {}
-        self._configure(setup.named_policies)
+        self._table = setup.table
+        self._configure(setup.table)
 
-    def reload(self, policies: Mapping[str, TopicPolicy]) -> None:
-        """Put the policies of the file, by topic name, in force again."""
+    def reload(self, table: PolicyTable) -> None:
+        """Put the policies of the file in force again."""
         self.changed.clear()
-        self._configure(policies)
+        self._configure(table)
         self.announce_all()
 
     def offer(self, topic_id: int, declaration: Declaration) -> TopicPolicy:
@@ -49,16 +49,20 @@ class Policies:
         """
         known = self._offers.get(topic_id)
         self._offers[topic_id] = declaration if known is None else known.joined(declaration)
-        self._link.set_policy(topic_id, self._policy(topic_id))
+        self._apply(topic_id)
         return self._link.policy(topic_id)
 
     def told(self, topic_id: int) -> Told:
         """Where a topic's policy comes from."""
-        offer, configured = self._offers.get(topic_id), self._configured_for(topic_id)
-        # The file wins, key by key.
-        is_offered = offer is not None and merged(configured, offer.policy) != configured
-        words = offer.words if offer is not None and is_offered else ""
-        return Told(self._setup.source, self.changed.get(topic_id, ()), words)
+        offer, topic = self._offers.get(topic_id), self._link.topic(topic_id)
+        offered = DEFAULT_POLICY if offer is None else offer.policy
+        origins = self._table.origins(_name(topic), topic.type, offered)
+        return Told(
+            self._setup.source,
+            self.changed.get(topic_id, ()),
+            offer.words if offer is not None and "offer" in origins else "",
+            topic.type if "type" in origins else "",
+        )
 
     def topic_id(self, name: str) -> int:
         """The id of a topic by its bus name or registry name. Raises UserError."""
@@ -99,7 +103,7 @@ class Policies:
                 f"{name} --reserve RATE:SIZE, such as 50:1KB"
             )
         self.changed.setdefault(topic_id, {}).update({k: getattr(new, k) for k in changes})
-        self._link.set_policy(topic_id, self._policy(topic_id))
+        self._apply(topic_id)
         # Report the policy as the link has it, not as it was given.
         new = self._link.policy(topic_id)
         self.announce_all()
@@ -118,23 +122,32 @@ class Policies:
             topics = self._link.own_topics
             self.announce({topic.id: self._link.policy(topic.id) for topic in topics})
 
-    def _configure(self, policies: Mapping[str, TopicPolicy]) -> None:
-        self._configured = policies
+    def _configure(self, table: PolicyTable) -> None:
+        self._table = table
         for topic in self._link.own_topics:
-            self._link.set_policy(topic.id, self._policy(topic.id))
-        self._link.set_named_policies(policies)
+            self._apply(topic.id)
+        self._link.set_table(table)
 
-    def _policy(self, topic_id: int) -> TopicPolicy:
-        """The policy by the file and the topic's producers, with what was set since."""
-        configured = self._configured_for(topic_id)
-        offer = self._offers.get(topic_id)
-        policy = configured if offer is None else merged(configured, offer.policy)
-        return msgspec.structs.replace(policy, **self.changed.get(topic_id, {}))
+    def _apply(self, topic_id: int) -> None:
+        """Put the policy by the table and the topic's producers in force, as changed since."""
+        topic, offer = self._link.topic(topic_id), self._offers.get(topic_id)
+        offered = DEFAULT_POLICY if offer is None else offer.policy
+        changed = self.changed.get(topic_id, {})
+        policy, command = (
+            msgspec.structs.replace(
+                self._table.made(_name(topic), topic.type, offered, is_command=is_command),
+                **changed,
+            )
+            for is_command in (False, True)
+        )
+        origins = self._table.origins(_name(topic), topic.type, offered)
+        origin = "set" if changed else next(iter(origins), "default")
+        self._link.set_policy(topic_id, policy, command, origin)
 
-    def _configured_for(self, topic_id: int) -> TopicPolicy:
-        """The policy by the file; of another robot's topic, that of its name there."""
-        name = read_origin(self._link.topic(topic_id).name).name
-        return self._configured.get(name, DEFAULT_POLICY)
+
+def _name(topic: Topic) -> str:
+    """The name of a topic at the robot whose topic it is."""
+    return read_origin(topic.name).name
 
 
 def _told(value: object) -> object:

@@ -61,13 +61,13 @@ class Reloading:
             for key in _of_the_radio(changed.config)
         )
         if self._opening.is_working or (self._opening.is_up and is_same):
-            self._policies.reload(changed.named_policies)
+            self._policies.reload(changed.table)
             return "topic policies"
         self._check(changed)
         fixed = self._fixed(changed.config)
         if fixed:
             raise UserError(f"{', '.join(fixed)}: changed; restart the daemon to apply it")
-        self._policies.reload(changed.named_policies)
+        self._policies.reload(changed.table)
         self._opening.try_again(changed)
         return "topic policies and the radio's settings"
 

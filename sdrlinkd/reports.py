@@ -55,6 +55,9 @@ class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
     """Default age in s after which a message is not sent any more; null: no limit."""
     lifespan_from: str = ""
     """Where the default lifespan is set: topic | class; empty: nowhere."""
+    policy_from: str = ""
+    """First of these that gives a key of its policy: set (while running) | file | type | offer |
+    default"""
     queue_ms: float | None = None
     """Recent mean of the time that messages waited behind others, in ms; null: unknown."""
     access_ms: float | None = None

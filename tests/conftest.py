@@ -38,14 +38,29 @@ def _no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("COLUMNS", raising=False)
 
 
+EACH_COUNTS = """
+[topic]
+odom.depth = 0
+scan.depth = 0
+imu = { depth = 0, lifespan_s = inf }
+cmd_vel.depth = 0
+"""
+"""Tests send bursts of messages and count them, of types of which only the newest is kept."""
+
+
 def write_settings(directory: Path, extra_toml: str = "") -> Path:
-    """Write a configuration with its sockets in `directory` and optional further TOML."""
+    """Write a configuration with its sockets in `directory` and optional further TOML.
+
+    Without a registry and policies of its own, each message of the shipped topics counts.
+    """
     top, tables = [], extra_toml
     while tables and not tables.startswith("["):
         line, _, tables = tables.partition("\n")
         top.append(line)
     if not any(line.startswith("registry") for line in top):
         top.append(f'registry = "{ETC / "registry.csv"}"')
+        if "[topic" not in tables:
+            tables += EACH_COUNTS
     config = directory / "sdrlinkd.toml"
     config.write_text(
         "\n".join([*top, "seed = 1", "[bus]", f'runtime_dir = "{directory}"', tables])

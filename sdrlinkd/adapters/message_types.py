@@ -21,7 +21,7 @@ class MessageTypes:
 
     def __init__(self, setup: Setup) -> None:
         self._stops: Mapping[int, bytes] = stop_messages(setup)
-        self._named = setup.named_policies
+        self._table = setup.table
         self._headers: dict[str, bool] = {}
 
     def has_header(self, kind: str) -> bool:
@@ -37,8 +37,8 @@ class MessageTypes:
         """The stop message of a topic as CDR; None if its type is unknown, or lacks a field."""
         if topic.about is None:
             return self._stops.get(topic.base)
-        policy = self._named.get(topic.at_origin)
+        policy = self._table.of(topic.at_origin, topic.type, is_command=True)
         try:
-            return cdr_from_fields(topic.type, policy.stop if policy else {}, topic.name)
+            return cdr_from_fields(topic.type, policy.stop, topic.name)
         except UserError:
             return None

@@ -25,18 +25,18 @@ def stop_messages(setup: Setup) -> dict[int, bytes]:
 def _made(setup: Setup) -> dict[int, bytes]:
     made = {}
     for topic in setup.registry.topics:
-        policy = setup.policies.get(topic.id)
-        given = policy.stop if policy is not None else {}
+        policy = setup.table.of(topic.name, topic.type, is_command=True)
+        configured = setup.table.configured(topic.name)
         where = f"topic.{topic.name}"
         if not knows(topic.type):
-            if policy is not None and (policy.deadman_s or given):
+            if configured.deadman_s or configured.stop:
                 raise ConfigError(
-                    f"{where}.deadman_s: got {policy.deadman_s:g}, but the type {topic.type} is "
-                    "unknown here, so no stop message can be made; allowed: 0"
+                    f"{where}.deadman_s: got {configured.deadman_s:g}, but the type "
+                    f"{topic.type} is unknown here, so no stop message can be made; allowed: 0"
                 )
             continue
         try:
-            made[topic.id] = cdr_from_fields(topic.type, given, f"{where}.stop")
+            made[topic.id] = cdr_from_fields(topic.type, policy.stop, f"{where}.stop")
         except UserError as error:
             raise ConfigError(str(error)) from None
     return made

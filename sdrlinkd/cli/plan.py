@@ -95,8 +95,9 @@ def plan(
         recording = None if bag is None else stack.enter_context(contextlib.closing(open_bag(bag)))
         if has_numbers:
             recorded = [] if recording is None else recording.topics()
-            names = [*names_in(topic or []), *(setup.name_on_air(each.name) for each in recorded)]
-            registry, policies = with_declared(registry, setup.named_policies, names)
+            types = dict.fromkeys(names_in(topic or []), "")
+            types |= {setup.name_on_air(each.name): each.type for each in recorded}
+            registry, policies = with_declared(registry, setup.table, types)
         loads = [parse_load(text, registry) for text in topic or []]
         left_out: list[LeftOut] = []
         if recording is not None:

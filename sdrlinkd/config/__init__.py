@@ -20,7 +20,7 @@ from sdrlinkd.config.quantities import example as unit_example
 from sdrlinkd.config.radios import GnuRadioParams
 from sdrlinkd.config.schema import WITHOUT_AIR, BusParams, Config
 from sdrlinkd.config.setup import TF_TYPE, UNBOUNDED_TYPES, Setup, make_setup
-from sdrlinkd.config.topics import load_registry
+from sdrlinkd.config.topics import load_registry, policies_by_type
 
 __all__ = [
     "ENDPOINT",
@@ -51,6 +51,7 @@ __all__ = [
     "make_setup",
     "parse_config",
     "parse_toml",
+    "policies_by_type",
     "typed_config",
     "unchecked",
     "unit_example",

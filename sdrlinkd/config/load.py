@@ -5,7 +5,7 @@ import tomllib
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 from msgspec import inspect
@@ -62,9 +62,21 @@ def _read(text: str, source: str) -> dict[str, object]:
 def _typed(raw: dict[str, object], text: str, source: str, kind: type[S]) -> S:
     _refuse_unknown(raw, describe.type_of(kind), [], text, source)
     try:
-        return msgspec.convert(quantities.as_numbers(raw, describe.type_of(kind)), kind)
+        typed = msgspec.convert(quantities.as_numbers(raw, describe.type_of(kind)), kind)
     except msgspec.ValidationError as error:
         raise _explain(error, raw, text, source, describe.type_of(kind)) from None
+    _note_given(typed, raw)
+    return typed
+
+
+def _note_given(typed: msgspec.Struct, raw: Mapping[str, Any]) -> None:
+    """Note in each policy which keys `raw` gives, as absent ones may come from elsewhere."""
+    for section in typed.__struct_fields__:
+        policies = getattr(typed, section)
+        if isinstance(policies, dict):
+            for name, policy in policies.items():
+                if isinstance(policy, TopicPolicy):
+                    policies[name] = policy.given_in(raw[section][name])
 
 
 def explain_policy(changes: Mapping[str, object]) -> str:

@@ -22,13 +22,14 @@ from sdrlinkd.config.robot_id import robot_id
 from sdrlinkd.config.schema import WITHOUT_AIR, Config
 from sdrlinkd.config.topics import (
     policies_by_name,
+    policies_by_type,
     registry_of,
     topics_from_bus,
     uses_numbers,
     with_commands,
 )
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link import Qos, TopicPolicy, check_access, flush_told
+from sdrlinkd.link import PolicyTable, Qos, TopicPolicy, check_access, flush_told
 from sdrlinkd.wire import (
     BROADCAST,
     Registry,
@@ -66,12 +67,11 @@ class Setup:
     node_id: int
     topics_in: dict[str, int]
     """Topic ids of the topics taken from the bus, by bus topic."""
-    policies: dict[int, TopicPolicy]
+    table: PolicyTable
+    """Which policy a topic gets: as configured, or by its message type."""
     dictionaries: dict[int, ZstdCompressionDict]
     has_numbers: bool
     """Whether producers may declare topics beyond the registry."""
-    named_policies: dict[str, TopicPolicy]
-    """The configured policies by topic name without leading slash."""
     transforms: frozenset[str]
     """Names, without leading slash, of the topics to which [tf] applies."""
     warnings: list[str]
@@ -79,6 +79,11 @@ class Setup:
     """Warnings by topic id, which matter only once the topic is used."""
     source: str = ""
     """The configuration file; empty if there is none."""
+
+    @cached_property
+    def policies(self) -> dict[int, TopicPolicy]:
+        """The policies of the registry's topics by topic id, if no producer offers more."""
+        return {each.id: self.table.of(each.name, each.type) for each in self.registry.topics}
 
     def republished_as(self, src: int, topic_id: int) -> str:
         """The bus topic under which messages of a registry's topic from robot `src` appear."""
@@ -204,16 +209,15 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
     check_reserved(config, named, registry)
     if has_numbers:
         named = with_commands(named, node_id)
-    policies = {topic.id: named[topic.name] for topic in registry.topics if topic.name in named}
+    configured = {topic.id: named[topic.name] for topic in registry.topics if topic.name in named}
     return Setup(
         config=config,
         registry=registry,
         node_id=node_id,
         topics_in=topics_in,
-        policies=policies,
+        table=PolicyTable(named, policies_by_type()),
         has_numbers=has_numbers,
-        named_policies=named,
-        dictionaries=load_dictionaries(policies, registry, base),
+        dictionaries=load_dictionaries(configured, registry, base),
         transforms=_transforms(config, registry, has_numbers),
         warnings=_warnings(config, registry),
         topic_warnings={} if has_numbers else _topic_warnings(config, registry),

@@ -1,15 +1,19 @@
 """Which topics a configuration means: registry, declared topics, subscriptions and policies."""
 
+from functools import cache
 from pathlib import Path
 
+from sdrlinkd.config.load import parse_toml
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError, RegistryError, UserError
 from sdrlinkd.files import read_bounded
-from sdrlinkd.link import TopicPolicy
+from sdrlinkd.link import TopicPolicy, TypePolicies
 from sdrlinkd.wire import DECLARED_TOPIC_ID, Registry, is_topic_name, parse_registry
 
 REGISTRY = "registry.csv"
 """The registry beside a configuration that names none."""
+BY_TYPE = Path(__file__).with_name("policies.toml")
+"""What topics get by their message type."""
 
 
 def registry_of(config: Config, base: Path) -> Registry:
@@ -86,6 +90,12 @@ def policies_by_name(
             raise ConfigError(f'topic."{given}": listed twice, with and without the slash')
         policies[name] = policy
     return policies
+
+
+@cache
+def policies_by_type() -> TypePolicies:
+    """The shipped policies by message type."""
+    return parse_toml(BY_TYPE.read_text(), str(BY_TYPE), TypePolicies)
 
 
 def with_commands(policies: dict[str, TopicPolicy], node_id: int) -> dict[str, TopicPolicy]:

@@ -81,6 +81,9 @@ def write_config(
             lines += [f"transmit = '{recording}'"]
         else:
             lines += [f"receive = '{recording}'", "paced = false", "wait_for_consumer = true"]
+    # As in the paper each message counts, and a machine that stalls must not replace any.
+    lines.append("[topic]")
+    lines += [f"{topic.name!r}.offer = false" for topic in source.registry.topics]
     path = directory / "sdrlinkd.toml"
     path.write_text("\n".join(lines) + "\n")
     return path

@@ -1,13 +1,13 @@
 """Log lines on what has changed from one snapshot to the next."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from enum import Enum
 from typing import NamedTuple
 
 from sdrlinkd.health.lately import Lately, shed_by_topic
 from sdrlinkd.health.verdict import is_away, is_silent
 from sdrlinkd.health.words import pdu_link_name, span
-from sdrlinkd.reports import NeighborReport, Snapshot
+from sdrlinkd.reports import NeighborReport, Snapshot, TopicReport
 
 
 class Level(Enum):
@@ -41,6 +41,7 @@ class Story:
         self._is_shed_by_traffic = True
         self._losing_at: float | None = None
         self._steps = 0
+        self._replaced: set[str] = set()
 
     def tell(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
         """Log lines on what is new in a snapshot."""
@@ -50,9 +51,22 @@ class Story:
                 yield from self._robot(robot, snapshot)
         yield from self._queue(snapshot, lately)
         yield from self._samples(snapshot, lately)
+        yield from self._replacing(snapshot.link.topics)
         if snapshot.host_clock_steps > self._steps:
             yield Line("host clock", Level.WARNING, "this host's clock was stepped")
         self._steps = snapshot.host_clock_steps
+
+    def _replacing(self, topics: Sequence[TopicReport]) -> Iterator[Line]:
+        """A line for each topic on its first messages that newer ones replaced."""
+        for topic in topics:
+            n = topic.dropped.get("tx_superseded", 0)
+            if n and topic.name not in self._replaced:
+                self._replaced.add(topic.name)
+                text = (
+                    f"{topic.name}: newer messages replace those that wait, {n} so far; this is "
+                    f"said once, `sdrlinkctl why {topic.name}` tells the depth and the number"
+                )
+                yield Line(topic.name, Level.INFO, text)
 
     def _radio(self, snapshot: Snapshot) -> Iterator[Line]:
         pdu_link, now = snapshot.carrier, snapshot.uptime_s

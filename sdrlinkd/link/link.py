@@ -21,6 +21,7 @@ from sdrlinkd.link.queue import (
     Kept,
     Latched,
     Outbox,
+    PolicyTable,
     TopicPolicy,
 )
 from sdrlinkd.link.receipts import Receipts, Verdict, make_receipt
@@ -321,6 +322,7 @@ class Link:
     ) -> str | None:
         """Queue a message; returns None, or the ledger's reason for refusing it."""
         intake, bytes_per_s = self._intake, self._scheduler.bytes_per_s
+        overrides = intake.keyed(topic_id, payload, overrides)
         is_urgent = overrides.qos is Qos.URGENT
         is_admitted = is_urgent or not self._team_air.is_refused(octet(topic_id))
         refused = intake.submit(
@@ -335,7 +337,9 @@ class Link:
                 dst = intake.destination(topic_id) if dst is None else dst
                 self._receipts.unknowable(overrides.receipt, topic_id, dst)
         if refused is None:
-            qos = overrides.qos if overrides.qos is not None else intake.treatment(topic_id)[0]
+            qos = overrides.qos
+            if qos is None:
+                qos, _ = intake.treatment(topic_id, overrides.dst)
             flow, k = Flow(self.own_id, self.own_id, topic_id), self._composer.k_single
             self._forecasts.note(flow, qos, now, max(1, -(-len(payload) // k)))
             self._scheduler.more_to_send()
@@ -430,17 +434,27 @@ class Link:
         for topic in self._topics:
             self.set_policy(topic.id, policies.get(topic.id, DEFAULT_POLICY))
 
-    def set_named_policies(self, policies: Mapping[str, TopicPolicy]) -> None:
-        """Treat messages of topics that others declare by the policy of their name."""
-        self._reception.set_named(policies)
+    def set_table(self, table: PolicyTable) -> None:
+        """Treat messages of topics that others declare by the policies of `table`."""
+        self._reception.set_table(table)
 
-    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
-        """Change a topic's policy from now on."""
-        self._intake.set_policy(topic_id, policy)
+    def set_policy(
+        self,
+        topic_id: int,
+        policy: TopicPolicy,
+        command: TopicPolicy | None = None,
+        origin: str = "",
+    ) -> None:
+        """Change a topic's policy from now on.
+
+        `command` is for messages that are sent to one robot; None: the same. `origin` says where
+        it comes from, for reports.
+        """
+        self._intake.set_policy(topic_id, policy, command, origin)
         if policy.durability == "volatile":
             self._latched.forget(topic_id)
         if topic_id < FIRST_NUMBER:
-            self._reception.set_policy(topic_id, policy)
+            self._reception.set_policy(topic_id, policy, command)
         else:
             self._topics.set_depth(topic_id, policy.latched)
 

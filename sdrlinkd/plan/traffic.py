@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import DEFAULT_POLICY, Deflated, TopicPolicy
+from sdrlinkd.link import DEFAULT_POLICY, Deflated, PolicyTable, TopicPolicy
 from sdrlinkd.units import octets
 from sdrlinkd.wire import FIRST_NUMBER, Registry, Topic, is_topic_name
 
@@ -35,20 +35,19 @@ class LeftOut(NamedTuple):
 
 
 def with_declared(
-    registry: Registry, policies: Mapping[str, TopicPolicy], names: Iterable[str]
+    registry: Registry, table: PolicyTable, types: Mapping[str, str]
 ) -> tuple[Registry, dict[int, TopicPolicy]]:
-    """The registry, followed by the topics `names`, and the policies by topic id.
+    """The registry, followed by the topics of `types`, and the policies by topic id.
 
-    For robots whose producers may declare topics; `policies` are by topic name.
+    For robots whose producers may declare topics. `types` are message types by topic name; empty:
+    unknown.
     """
     known = {topic.name for topic in registry.topics}
-    more = [name for each in names if is_topic_name(name := each.removeprefix("/"))]
-    declared = [
-        Topic(FIRST_NUMBER + i, name, "")
-        for i, name in enumerate(dict.fromkeys(each for each in more if each not in known))
-    ]
+    names = {each.removeprefix("/"): kind for each, kind in types.items()}
+    more = [name for name in names if is_topic_name(name) and name not in known]
+    declared = [Topic(FIRST_NUMBER + i, name, names[name]) for i, name in enumerate(more)]
     both = Registry([*registry.topics, *declared])
-    return both, {each.id: policies[each.name] for each in both.topics if each.name in policies}
+    return both, {each.id: table.of(each.name, each.type) for each in both.topics}
 
 
 def names_in(texts: Iterable[str]) -> list[str]:

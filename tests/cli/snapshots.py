@@ -69,18 +69,18 @@ SNAPSHOT = Snapshot(
             TopicReport(
                 topic_id=0, name="/robot_1/scan", type="sensor_msgs/msg/LaserScan",
                 subscribed=True, qos="bulk", priority=64, accepted=60, accepted_per_s=10.0,
-                accepted_bytes_per_s=15_000.0,
+                accepted_bytes_per_s=15_000.0, policy_from="file",
                 sent=50, sent_bytes=75_000, queued=10,
             ),
             TopicReport(
                 topic_id=1, name="/robot_1/odom", type="nav_msgs/msg/Odometry", subscribed=True,
                 qos="latency", priority=90, accepted=69, accepted_per_s=29.9,
                 accepted_bytes_per_s=21_648.0, sent=60,
-                sent_bytes=43_440, queued=2, dropped={"tx_expired": 5},
+                sent_bytes=43_440, queued=2, dropped={"tx_expired": 5}, policy_from="type",
             ),
             TopicReport(
                 topic_id=2, name="/imu", type="sensor_msgs/msg/Imu", subscribed=False,
-                qos="default", priority=64,
+                qos="default", priority=64, policy_from="default",
             ),
         ],
         received=[

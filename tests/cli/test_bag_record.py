@@ -82,7 +82,7 @@ def test_a_bag_is_whole_between_any_two_writes(tmp_path, monkeypatch):
 
 
 def test_what_is_recorded_outlives_the_recorder(start_daemon, tmp_path):
-    daemon = start_daemon('[topic.map]\ndurability = "transient_local"\n')
+    daemon = start_daemon('[topic]\nodom.depth = 0\nmap.durability = "transient_local"\n')
     bag = tmp_path / "bag"
     arguments = ("bag", "record", bag, "--sent", "--runtime-dir", daemon.directory)
     sent = [odometry(i) for i in range(20)]

@@ -163,7 +163,7 @@ def test_what_others_send_is_shown_as_it_is(start_daemon, tmp_path):
 def test_a_bag_with_another_type_is_left_out_by_name(start_daemon, ctl, recorded, tmp_path):
     registry = tmp_path / "own.csv"
     registry.write_text("odom,std_msgs/String\nimu,sensor_msgs/Imu\n")
-    daemon = start_daemon(f'registry = "{registry}"\n')
+    daemon = start_daemon(f'registry = "{registry}"\n[topic.imu]\ndepth = 0\n')
     code, out, err = ctl("bag", "play", recorded, "--rate", "50", "--runtime-dir", daemon.directory)
     assert code == 0
     assert "played 100 messages" in out
@@ -172,6 +172,21 @@ def test_a_bag_with_another_type_is_left_out_by_name(start_daemon, ctl, recorded
         in " ".join(err.split())
     )
     assert daemon.snapshot().link.tx.dropped == {}
+
+
+def test_a_bag_declares_its_topics_where_the_daemon_has_no_registry(start_daemon, ctl, recorded):
+    daemon = start_daemon('registry = ""\n[topic.imu]\ndepth = 0\n')
+    code, out, err = ctl("bag", "play", recorded, "--rate", "5", "--runtime-dir", daemon.directory)
+    assert (code, err.count("left out")) == (0, 0)
+    assert "played 200 messages" in out
+    topics = {topic.name: topic for topic in daemon.snapshot().link.topics}
+    assert {name: topic.qos for name, topic in topics.items()} == {
+        "/robot_1/scan": "latency", "/robot_1/odom": "latency", "/robot_1/imu": "latency",
+        "/robot_1/cmd_vel": "latency",
+    }  # fmt: skip
+    assert (topics["/robot_1/odom"].policy_from, topics["/robot_1/imu"].policy_from) == (
+        "type", "file",
+    )  # fmt: skip
 
 
 def test_pdu_watch_ends_with_the_daemon(start_daemon):
@@ -369,23 +384,23 @@ def test_completion_and_help(ctl, monkeypatch):
 
 
 def test_a_policy_is_set_while_the_daemon_runs_and_explained(start_daemon, ctl):
-    daemon = start_daemon()
+    daemon = start_daemon("[topic]\n")
     there = ("--runtime-dir", daemon.directory)
     code, out, _ = ctl(
-        "set", "/robot_1/odom", "--qos", "latency", "--priority", "90", "--period", "10s",
-        "--lifespan", "300ms", "--depth", "1", "--compress", "zstd", *there,
+        "set", "/robot_1/odom", "--qos", "bulk", "--priority", "90", "--period", "10s",
+        "--lifespan", "300ms", "--depth", "2", "--compress", "zstd", *there,
     )  # fmt: skip
     assert code == 0
     assert out.splitlines() == [
-        "odom:", "  qos: default -> latency", "  priority: 64 -> 90", "  period_s: 0 -> 10",
-        "  lifespan_s: that of its class -> 0.3", "  depth: 0 -> 1", "  compress: none -> zstd",
+        "odom:", "  qos: latency -> bulk", "  priority: 64 -> 90", "  period_s: 0 -> 10",
+        "  lifespan_s: that of its class -> 0.3", "  depth: 1 -> 2", "  compress: none -> zstd",
     ]  # fmt: skip
     publish(daemon, 10)
     wait_for(lambda: daemon.snapshot().link.tx.accepted == 10)
     assert daemon.snapshot().link.topics[1].priority == 90
     code, out, _ = ctl("why", "odom", *there)
     assert code == 0
-    assert "class latency, priority 90" in out
+    assert "class bulk, priority 90" in out
     assert "90 % throttled to 0.1 Hz by sdrlinkctl set (tx_throttled, 9)" in out
     code, out, _ = ctl("why", "odom", "--json", *there)
     assert len(json.loads(out)) >= 3

@@ -5,9 +5,17 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from sdrlinkd.config import Config, load_config, make_setup, parse_config
+from sdrlinkd.config import (
+    TF_TYPE,
+    Config,
+    load_config,
+    make_setup,
+    parse_config,
+    policies_by_type,
+)
 from sdrlinkd.errors import ConfigError, RegistryError, UserError
 from sdrlinkd.link import ClassParams, TopicPolicy
+from sdrlinkd.wire import topic_type
 
 ROOT = Path(__file__).parents[2]
 ETC = ROOT / "etc"
@@ -174,7 +182,7 @@ def test_a_missing_registry_says_what_it_is(tmp_path):
 def test_without_a_registry_producers_declare_topics(tmp_path):
     setup = make_setup(Config(topic={"/odom": TopicPolicy(priority=9)}), tmp_path)
     assert (len(setup.registry), setup.topics_in, setup.has_numbers) == (0, {}, True)
-    assert setup.named_policies["odom"] == TopicPolicy(priority=9)
+    assert setup.table.of("odom", "std_msgs/msg/String") == TopicPolicy(priority=9)
     assert "producers declare topics" in setup.summary()
     (tmp_path / "registry.csv").write_text("odom,nav_msgs/Odometry\n")
     setup = make_setup(Config(), tmp_path)
@@ -207,9 +215,65 @@ def test_a_policy_holds_for_commands_to_this_robot_too(tmp_path):
     slow, fast = TopicPolicy(deadman_s=0.3), TopicPolicy(deadman_s=0.1)
     given = {"cmd_vel": slow, "goal": slow, "robot_2/goal": fast}
     setup = make_setup(Config(namespace="robot_2", topic=given), tmp_path)
-    named = setup.named_policies
-    assert (named["robot_2/cmd_vel"], named["cmd_vel"]) == (slow, slow)
-    assert named["robot_2/goal"] == fast, "a policy of its own"
+    of = setup.table.configured
+    assert (of("robot_2/cmd_vel"), of("cmd_vel")) == (slow, slow)
+    assert of("robot_2/goal") == fast, "a policy of its own"
+
+
+ODOMETRY, TWIST, STRING = (
+    "nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist", "std_msgs/msg/String",
+)  # fmt: skip
+
+
+def test_every_shipped_policy_names_a_ros_type_and_changes_something():
+    table = policies_by_type()
+    for kinds in (table.type, table.command):
+        for kind, policy in kinds.items():
+            assert topic_type(kind) == kind
+            assert policy.given
+            assert policy.offer
+    assert table.command.keys() <= table.type.keys()
+    for policy in table.command.values():
+        assert policy.qos == "urgent", "what moves a robot goes first"
+        assert 0 < policy.own_lifespan_s <= policy.deadman_s
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "is_command", "says"),
+    [
+        ("", ODOMETRY, False, TopicPolicy(qos="latency", depth=1, lifespan_s=5.0)),
+        ("", STRING, False, TopicPolicy(depth=9, lifespan_s=5.0)),
+        ("[topic.x]\ndepth = 3", ODOMETRY, False,
+         TopicPolicy(qos="latency", depth=3, lifespan_s=5.0)),
+        # Also a value that is the default is given.
+        ("[topic.x]\ndepth = 0\nqos = 'default'", ODOMETRY, False, TopicPolicy(lifespan_s=5.0)),
+        ("[topic.x]\noffer = false", ODOMETRY, True, TopicPolicy(offer=False)),
+        ("", TWIST, False,
+         TopicPolicy(qos="latency", depth=1, max_bytes=1024, lifespan_s=5.0)),
+        ("", TWIST, True, TopicPolicy(
+            qos="urgent", depth=1, max_bytes=1024, lifespan_s=0.3, deadman_s=0.5)),
+        ("[topic.x]\ndeadman_s = 0", TWIST, True,
+         TopicPolicy(qos="urgent", depth=1, max_bytes=1024, lifespan_s=0.3)),
+    ],
+)  # fmt: skip
+def test_a_file_wins_over_the_type_and_the_type_over_the_offer(
+    tmp_path, text, kind, is_command, says
+):
+    table = make_setup(parse_config(text), tmp_path).table
+    offered = TopicPolicy(depth=9, lifespan_s=5.0)
+    assert table.made("x", kind, offered, is_command=is_command) == says
+    origins = table.origins("x", kind, offered)
+    assert origins[0] == ("file" if text else "offer" if kind == STRING else "type")
+    gives_all = "offer = false" in text or "qos" in text
+    assert ("type" in origins) == (kind != STRING and not gives_all)
+    assert ("offer" in origins) == ("offer" not in text)
+
+
+def test_static_transforms_are_latched_wherever_they_are():
+    table = make_setup(parse_config(""), ETC).table
+    for name in ("tf_static", "robot_2/tf_static"):
+        assert table.of(name, TF_TYPE).latched == 1
+    assert table.of("tf", TF_TYPE) == TopicPolicy(qos="latency", depth=1, key="child_frames")
 
 
 def test_a_policy_of_a_declared_topic_needs_a_ros_name(tmp_path):

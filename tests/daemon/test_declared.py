@@ -44,7 +44,7 @@ def test_a_topic_is_declared_and_used_without_a_registry(start_daemon):
         with pytest.raises(MessageRefusedError, match="allowed: none"):
             out.send("/robot_1/battery", CDR)
         told = declare(daemon, "/robot_1/battery", hash=HASH, reliability="best_effort")
-        assert (told["name"], told["robot"], told["depth"]) == ("battery", 1, 1)
+        assert (told["name"], told["robot"], told["depth"]) == ("battery", 1, 5)
         assert told["lifespan_s"] == 0.5
         with Subscriber("/rx_robot_1/battery", directory=daemon.directory) as heard:
             out.send("/robot_1/battery", CDR + b"full", type="std_msgs/msg/String")
@@ -63,9 +63,10 @@ def test_a_topic_is_declared_and_used_without_a_registry(start_daemon):
 @pytest.mark.parametrize(
     ("qos", "depth", "lifespan_s", "words"),
     [
-        ({"reliability": "best_effort"}, 1, 0.5, "depth 1, lifespan 500 ms"),
-        ({"reliability": "reliable"}, 10, 5.0, "depth 10, lifespan 5 s"),
-        ({}, 10, 5.0, "the producer's offer: reliable"),
+        ({"reliability": "best_effort"}, 5, 0.5, "depth 5, lifespan 500 ms"),
+        ({"reliability": "best_effort", "depth": 40}, 40, 0.5, "depth 40, lifespan 500 ms"),
+        ({"reliability": "reliable"}, 100, 5.0, "depth 100, lifespan 5 s"),
+        ({}, 100, 5.0, "the producer's offer: reliable"),
         ({"durability": "transient_local", "depth": 3}, 3, None, "last 3 messages kept"),
     ],
 )
@@ -79,14 +80,14 @@ def test_the_policy_follows_the_offer(start_daemon, qos, depth, lifespan_s, word
 def test_what_is_configured_or_set_wins(start_daemon):
     daemon = start_daemon(f"{NO_REGISTRY}[topic.a]\nlifespan_s = 2.0\npriority = 9\n")
     told = declare(daemon, "/robot_1/a")
-    assert (told["depth"], told["lifespan_s"]) == (10, 2.0)
+    assert (told["depth"], told["lifespan_s"]) == (100, 2.0)
     ask(daemon, "set", topic="/robot_1/a", depth=4)
     assert declare(daemon, "/robot_1/a")["depth"] == 4
     why = ask(daemon, "why", topic="/robot_1/a")["why"][0]
     assert "priority 9" in why
     assert "set while running: depth" in why
     ask(daemon, "reload")
-    assert declare(daemon, "/robot_1/a")["depth"] == 10
+    assert declare(daemon, "/robot_1/a")["depth"] == 100
 
 
 def test_a_file_can_ignore_the_offer(start_daemon):
@@ -96,7 +97,7 @@ def test_a_file_can_ignore_the_offer(start_daemon):
 
 
 def test_a_registrys_topic_can_be_offered_and_a_new_one_cannot(start_daemon):
-    daemon = start_daemon()
+    daemon = start_daemon("[topic]\n")
     told = declare(daemon, "/robot_1/odom", "nav_msgs/msg/Odometry", reliability="best_effort")
     assert (told["number"], told["depth"]) == (1, 1)
     with pytest.raises(RefusedError, match="auto = true"):
@@ -130,7 +131,7 @@ def test_several_producers_of_a_topic(start_daemon):
         ({"name": "/a", "type": "p/srv/T"}, "type: got 'p/srv/T'"),
         ({"name": "/a", "type": "p/T", "hash": "md5"}, "hash: got 'md5'"),
         ({"name": "/a", "type": "p/T", "reliability": "maybe"}, "reliability"),
-        ({"name": "/a", "type": "p/T", "depth": 256}, "depth"),
+        ({"name": "/a", "type": "p/T", "depth": 10_001}, "depth"),
     ],
 )
 def test_bad_declarations_are_refused_in_words(start_daemon, arguments, says):

@@ -159,6 +159,7 @@ def test_a_daemon_plays_the_topics_of_a_bag_that_it_knows(start_daemon, tmp_path
     node = start_daemon(
         f'namespace = ""\nrobot_id = 1\nregistry = "{registry}"\n'
         f'[play]\nbag = "{bag}"\nduration_s = 10.0\nwait_for_consumer = true\n'
+        "[topic.odom]\ndepth = 0\n"
     )
     expected = [cdr for topic, _, _, cdr in written if topic == "/odom"]
     with Subscriber(directory=node.directory) as heard:

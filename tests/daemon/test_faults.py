@@ -238,13 +238,13 @@ def test_an_occupied_socket_is_named_and_left_alone(tmp_path, name, write_config
 
 
 def test_sighup_rereads_policies_and_keeps_the_old_on_error(start_daemon):
-    daemon = start_daemon()
+    daemon = start_daemon("[topic.map]\nqos = 'bulk'\n")
     text = daemon.config.read_text()
 
     def qos():
         return next(t.qos for t in daemon.snapshot().link.topics if t.name == "/robot_1/odom")
 
-    assert qos() == "default"
+    assert qos() == "latency", "by its type"
     daemon.config.write_text(text + '[topic.odom]\nqos = "urgent"\n')
     daemon.send_signal(signal.SIGHUP)
     wait_for(lambda: qos() == "urgent")

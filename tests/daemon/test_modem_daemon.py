@@ -263,7 +263,7 @@ def test_a_killed_modem_is_replaced_and_no_message_is_lost_or_sent_twice(start_d
 def test_what_outlived_its_lifespan_during_a_stop_is_not_sent(start_daemon, who):
     """Daemon or modem stands still for longer than the messages live."""
     lifespan_s = 0.5
-    node = start_daemon(f"{LOOPBACK}[classes.latency]\nlifespan_s = {lifespan_s}\n")
+    node = start_daemon(LOOPBACK)
     sent_and_heard(node, 3)
     modem = next(pid for pid in family(node.pid) if pid != node.pid)
     stopped = node.pid if who == "daemon" else modem

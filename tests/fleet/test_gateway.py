@@ -34,7 +34,7 @@ def numbers_at(daemon, topic):
             while not is_over.is_set():
                 with contextlib.suppress(TimeoutError):
                     message = heard.receive(0.2)
-                    if message is not None:
+                    if message is not None and not message.is_stop:
                         found.append(number_of(message.payload))
 
     thread = threading.Thread(target=collect)

@@ -41,6 +41,7 @@ def test_topics_come_with_their_schemas_and_their_very_octets(team):
             viewer.until(lambda name=name: viewer.payloads(f"/rx_robot_1/{name}"))
         for each in sent:
             out.send("/robot_1/odom", each)
+            viewer.until(lambda each=each: viewer.payloads("/rx_robot_1/odom")[-1:] == [each])
         out.send("/robot_1/strange", odd)
         viewer.until(lambda: viewer.payloads("/rx_robot_1/odom")[-3:] == sent)
         viewer.until(lambda: viewer.payloads("/rx_robot_1/strange")[-1:] == [odd])
@@ -181,6 +182,7 @@ def test_commands_go_where_the_pattern_allows_and_nowhere_else(team):
             lambda: [each for each in _reports(viewer) if each["commands_refused"] == 5]
         )
         assert counts[0]["commands_sent"] == 2
+        assert heard.receive(20).is_stop, "as no more commands come"
         assert heard.receive(0.2) is None
     assert team.seen.snapshot().link.tx.accepted == 2
 

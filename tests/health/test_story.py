@@ -110,6 +110,18 @@ def test_a_queue_that_expires_without_a_radio_is_not_blamed_on_traffic():
     assert not any("capacity" in text for text in told)
 
 
+def test_messages_that_newer_ones_replace_are_told_once_for_each_topic():
+    def replaced(second, n, m):
+        of_a, of_b = ({"tx_superseded": each} for each in (n, m))
+        topics = [topic(name="/a", dropped=of_a), topic(name="/b", dropped=of_b)]
+        return snapshot(float(second), topics=topics)
+
+    told = story(replaced(1, 0, 0), replaced(2, 3, 0), replaced(3, 9, 0), replaced(4, 9, 1))
+    (a, b) = (line for line in told if "replace" in line[1])
+    assert a[1].startswith("/a: newer messages replace those that wait, 3 so far;")
+    assert "sdrlinkctl why /b" in b[1]
+
+
 def test_clocks_that_jump():
     def clock(steps):
         return [robot(clock=ClockReport(state="synced", steps=steps))]

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import DeclarationError
-from sdrlinkd.link import Offer, Outcome, Overrides, RelayParams, TopicPolicy
+from sdrlinkd.link import Offer, Outcome, Overrides, PolicyTable, RelayParams, TopicPolicy
 from sdrlinkd.link.topics import (
     MOST_KEYS,
     N_NUMBERS,
@@ -459,7 +459,7 @@ TWIST = "geometry_msgs/msg/Twist"
 @pytest.mark.parametrize("first", ["gateway", "robot"])
 def test_commands_over_a_gateway_and_from_their_robot_are_one_stream(first):
     robot, gateway, receiver = auto(1), auto(8), auto(4)
-    receiver.set_named_policies({"cmd_vel": TopicPolicy(deadman_s=0.3)})
+    receiver.set_table(PolicyTable({"cmd_vel": TopicPolicy(deadman_s=0.3)}))
     own, via = (
         link.declare(Offer(name, TWIST)).id
         for link, name in ((robot, "cmd_vel"), (gateway, "@1/cmd_vel"))
@@ -493,7 +493,7 @@ def test_commands_over_a_gateway_and_from_their_robot_are_one_stream(first):
 )
 def test_a_topic_of_a_robot_elsewhere_is_taken_only_from_both(allowed, n):
     gateway, receiver = auto(8), auto(4)
-    receiver.set_named_policies({"cmd_vel": TopicPolicy(from_=allowed)})
+    receiver.set_table(PolicyTable({"cmd_vel": TopicPolicy(from_=allowed)}))
     topic = gateway.declare(Offer("@1/cmd_vel", TWIST))
     for i in range(5):
         gateway.submit(topic.id, CDR + bytes(48), 0.05 * i)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import Qos
-from sdrlinkd.link.queue import Inflated, TopicPolicy
+from sdrlinkd.link.queue import Inflated, PolicyTable, TopicPolicy
 from sdrlinkd.link.receive import (
     Ages,
     Deadman,
@@ -199,7 +199,7 @@ def test_messages_are_taken_from_those_allowed_also_over_others(
 ):
     acceptance = accepting()
     acceptance.set_policy(0, TopicPolicy(from_=sources))
-    acceptance.set_named({"scan": TopicPolicy(from_=sources)})
+    acceptance.set_table(PolicyTable({"scan": TopicPolicy(from_=sources)}))
     taken = [acceptance.takes_from(topic, 9) for topic in (ODOM, DECLARED, FOR_OTHER)]
     assert taken == [of_own, of_declared, of_other]
 
@@ -209,14 +209,14 @@ def test_policies_are_by_id_in_the_registry_and_by_name_elsewhere():
     command, proven = TopicPolicy(deadman_s=0.5), TopicPolicy(unproven="deliver")
     assert not acceptance.delivers_unproven
     acceptance.set_policy(0, command)
-    acceptance.set_named({"odom": TopicPolicy(depth=3), "scan": proven})
+    acceptance.set_table(PolicyTable({"odom": TopicPolicy(depth=3), "scan": proven}))
     assert acceptance.policy_of(ODOM) is command
-    assert acceptance.policy_of(DECLARED) is acceptance.policy_of(FOR_OTHER) is proven
+    assert acceptance.policy_of(DECLARED) == acceptance.policy_of(FOR_OTHER) == proven
     assert acceptance.policy_of(None) == acceptance.policy_of(ODOM._replace(base=1))
     assert [acceptance.commands(each) for each in (ODOM, DECLARED, None)] == [True, False, False]
     assert [acceptance.takes_unproven(each) for each in (ODOM, DECLARED)] == [False, True]
     assert acceptance.delivers_unproven
-    acceptance.set_named({})
+    acceptance.set_table(PolicyTable({}))
     assert not acceptance.delivers_unproven
     acceptance.set_policy(1, proven)
     assert acceptance.delivers_unproven
@@ -239,7 +239,7 @@ def test_policies_are_by_id_in_the_registry_and_by_name_elsewhere():
 def test_what_is_kept_for_later_and_what_comes_too_late(policy, depth, own, declared, drops_late):
     acceptance = accepting()
     acceptance.set_policy(0, policy)
-    acceptance.set_named({"scan": policy})
+    acceptance.set_table(PolicyTable({"scan": policy}))
     topic = DECLARED._replace(about=ABOUT._replace(depth=depth))
     lifespan_s = policy.lifespan_s or inf
     assert acceptance.retain(ODOM) == Retain(own, lifespan_s)

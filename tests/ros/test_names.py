@@ -1,6 +1,5 @@
-"""Names, types, frames and routes of the bridge, which need no ROS."""
+"""Names, types and routes of the bridge, which need no ROS."""
 
-import struct
 import sys
 
 import pytest
@@ -8,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
 from sdrlink_ros.echoes import Echoes
-from sdrlink_ros.frames import child_frames, producer_key
 from sdrlink_ros.kinds import UnknownTypeError, kind, least_size
 from sdrlink_ros.names import Names, command_for, is_command, left_out, matches, unused
 from sdrlink_ros.offer import Offer
@@ -22,9 +20,9 @@ ODOM, IMAGE = "nav_msgs/msg/Odometry", "sensor_msgs/msg/Image"
 TF = "tf2_msgs/msg/TFMessage"
 
 
-def offer(name, kind_=ODOM, nodes=("/driver",), n=1, latched=False):
+def offer(name, kind_=ODOM, nodes=("/driver",), n=1, latched=False, reliable=True, depth=0):
     kinds = (kind_,) if isinstance(kind_, str) else kind_
-    return Offer(name, kinds, "", True, latched, n, nodes)
+    return Offer(name, kinds, "", reliable, latched, n, depth, nodes)
 
 
 def routes(*offers, own=1, heard=(), **settings):
@@ -74,9 +72,26 @@ def test_a_name_with_a_robots_prefix_is_a_command_or_its_own():
     assert "use one type" in two_types.refused["/x"]
 
 
-def test_several_publishers_of_a_latched_topic_are_all_kept():
-    found = routes(offer("/map", n=3, latched=True), offer("/tf_static", TF, n=3, latched=True))
-    assert [each.depth for each in found.taken.values()] == [3, 1], "frames tell the latter apart"
+@pytest.mark.parametrize(
+    ("offered", "depth"),
+    [
+        (offer("/x"), 0),
+        (offer("/x", n=2, depth=7), 14),
+        (offer("/x", n=2, reliable=False), 10),
+        (offer("/x", n=2, reliable=False, depth=1), 2),
+        (offer("/x", n=2, depth=9000), 10_000),
+        (offer("/x", latched=True, depth=5), 5),
+        (offer("/x", n=3, latched=True, depth=1), 3),
+        (offer("/x", latched=True), 5),
+        (offer("/x", n=2, latched=True, depth=200), 255),
+        (offer("/tf_static", TF, n=3, latched=True, depth=100), 1),
+        (offer("/tf_static", TF, n=2, depth=3), 6),
+    ],
+)
+def test_there_is_room_for_the_messages_of_each_publisher(offered, depth):
+    """Where ROS does not tell the depth it is generous, and /tf_static has one for each frame."""
+    (route,) = routes(offered).taken.values()
+    assert route.depth == depth
 
 
 def test_names_of_other_robots_and_commands():
@@ -139,40 +154,6 @@ def test_a_type_that_is_not_installed_names_its_package(name):
     with pytest.raises(UnknownTypeError, match="this type is not installed here; install"):
         kind(name)
     assert "this" not in sys.modules, "a name from the air imports nothing"
-
-
-def tf_message(*children):
-    types = ros2_types().types
-    transforms = []
-    for child in children:
-        each = empty("geometry_msgs/msg/TransformStamped")
-        each.child_frame_id, each.header.frame_id = child, "base" * (1 + len(child) % 3)
-        transforms.append(each)
-    return to_cdr(types[TF](transforms), TF)
-
-
-@given(st.lists(st.text(st.characters(min_codepoint=1, max_codepoint=0x2FF), max_size=12)))
-def test_child_frames_are_those_of_an_independent_reader(children):
-    cdr = tf_message(*children)
-    assert child_frames(cdr) == sorted(set(children))
-    assert len(producer_key(cdr).encode()) <= 32
-    assert child_frames(cdr + b"\0\0\0") == child_frames(cdr)
-
-
-@given(st.binary(max_size=200), st.integers(0, 400))
-def test_any_octets_are_frames_or_none(octets, cut):
-    for frame in child_frames(octets) or ():
-        assert frame.encode() in octets
-    cdr = tf_message("a", "lidar", "gps")
-    assert child_frames(cdr[:cut]) is None or cut >= len(cdr)
-    producer_key(octets)
-
-
-def test_producers_of_the_same_frames_have_one_key():
-    assert producer_key(tf_message("b", "a")) == producer_key(tf_message("a", "b")) == "a,b"
-    long = [f"frame_{i}" for i in range(20)]
-    assert producer_key(tf_message(*long)) == producer_key(tf_message(*reversed(long)))
-    assert producer_key(b"\0\1\0\0" + struct.pack("<I", 1 << 31)) == ""
 
 
 @given(st.binary(min_size=4, max_size=40), st.binary(max_size=3))

@@ -38,6 +38,7 @@ def _offer(name: str, publishers: Sequence[Any]) -> Offer:
         all(each.reliability == ReliabilityPolicy.RELIABLE for each in profiles),
         all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in profiles),
         len(publishers),
+        max(each.depth for each in profiles) if all(each.depth for each in profiles) else 0,
         tuple(sorted(nodes)),
     )
 

@@ -12,7 +12,6 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from sdrlink_ros import qos
 from sdrlink_ros.daemon import Daemon
 from sdrlink_ros.echoes import Echoes
-from sdrlink_ros.frames import producer_key
 from sdrlink_ros.kinds import Kind, UnknownTypeError, kind
 from sdrlink_ros.routes import TF_STATIC, Route
 from sdrlink_ros.sayings import Sayings
@@ -123,7 +122,7 @@ class Outgoing:
             "hash": offer.hash,
             "reliability": "reliable" if offer.is_reliable else "best_effort",
             "durability": "transient_local" if offer.is_latched else "volatile",
-            "depth": route.depth if offer.is_latched else 1,
+            "depth": route.depth,
         }
         try:
             kind(offer.kind)
@@ -238,7 +237,7 @@ class Taker:
                 spec.bus,
                 spec.head + cdr if spec.head else cdr,
                 dst=spec.robot,
-                key=spec.key or _producer(spec, cdr, info),
+                key=spec.key or _producer(spec, info),
                 published_ns=info.get("source_timestamp") or None,
                 wait=False,
             )
@@ -280,12 +279,13 @@ def _never(_: bytes) -> None:
     """The callback that rclpy asks for; no executor calls it."""
 
 
-def _producer(spec: Spec, cdr: bytes, info: Mapping[str, Any]) -> str | None:
-    """What tells the producers of a latched topic apart, if anything does."""
-    if not spec.is_latched:
+def _producer(spec: Spec, info: Mapping[str, Any]) -> str | None:
+    """What tells the producers of a latched topic apart, if anything does here.
+
+    The daemon tells those of /tf_static apart by their frames.
+    """
+    if not spec.is_latched or spec.name.endswith(TF_STATIC):
         return None
-    if spec.name.endswith(TF_STATIC):
-        return producer_key(cdr) or None
     # Before Lyrical, rclpy does not say who sent a message.
     gid = info.get("publisher_gid")
     return None if gid is None else bytes(gid).hex()[:32]

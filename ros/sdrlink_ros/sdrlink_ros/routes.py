@@ -8,6 +8,9 @@ from sdrlink_ros.offer import Offer
 from sdrlink_ros.settings import Settings
 
 TF_STATIC = "/tf_static"
+UNKNOWN_DEPTH = 5
+"""Depth of a latched or best-effort publisher that does not tell it: that of SensorDataQoS."""
+MOST_LATCHED, MOST_WAITING = 255, 10_000
 
 
 class Route(NamedTuple):
@@ -23,10 +26,17 @@ class Route(NamedTuple):
 
     @property
     def depth(self) -> int:
-        """How many messages of a latched topic late joiners get, of each producer told apart."""
-        # ROS does not say who sent a message, so the last one of each publisher is kept, if each
-        # sends one. The producers of /tf_static are told apart by their frames.
-        return 1 if self.offer.name == TF_STATIC else min(self.offer.n_publishers, 255)
+        """How many of its messages may wait; of a latched topic, how many late joiners get.
+
+        0: what the daemon finds right.
+        """
+        offer = self.offer
+        if offer.is_latched and offer.name == TF_STATIC:
+            # Its producers are told apart by their frames, and each has a last message.
+            return 1
+        each = offer.depth or (offer.is_latched or not offer.is_reliable) * UNKNOWN_DEPTH
+        # ROS does not say who sent a message, so there is room for the messages of each publisher.
+        return min(each * offer.n_publishers, MOST_LATCHED if offer.is_latched else MOST_WAITING)
 
 
 class Routes(NamedTuple):

@@ -55,9 +55,9 @@ def sent_table(reports: Sequence[TopicReport], *, rule: bool) -> FittedTable:
     table = FittedTable(
         "sent" if rule else "",
         (
-            words("topic out", least=18), words("class", 2, 7), figure("prio", 5), figure("Hz"),
-            figure("bytes", 1), figure("in", 4), figure("sent", 3), figure("queued"),
-            figure("dropped"),
+            words("topic out", least=18), words("class", 2, 7), words("by", 6, 4),
+            figure("prio", 5), figure("Hz"), figure("bytes", 1), figure("in", 4), figure("sent", 3),
+            figure("queued"), figure("dropped"),
         ),
         rule=rule,
     )  # fmt: skip
@@ -65,6 +65,7 @@ def sent_table(reports: Sequence[TopicReport], *, rule: bool) -> FittedTable:
         table.add(
             each.name,
             each.qos,
+            each.policy_from,
             str(each.priority),
             rate(each.accepted_per_s),
             bytes_rate(each.accepted_bytes_per_s),

@@ -16,6 +16,7 @@ class TopicRow(NamedTuple):
     name: str
     source: int | None
     qos: str
+    policy_from: str
     per_s: float
     bytes_per_s: float
     messages: int
@@ -63,8 +64,9 @@ def topics_table(rows: list[TopicRow]) -> FittedTable:
     table = FittedTable(
         "",
         (
-            words("", least=3), words("topic", least=18), words("class", 4, 7), figure("Hz"),
-            figure("bytes", 3), figure("count", 5), figure("queued", 2), figure("lost"),
+            words("", least=3), words("topic", least=18), words("class", 4, 7),
+            words("by", 7, 4), figure("Hz"), figure("bytes", 3), figure("count", 5),
+            figure("queued", 2), figure("lost"),
             figure("PDR"), figure("age ms", 6), figure("p99 ms"),
         ),
     )  # fmt: skip
@@ -74,6 +76,7 @@ def topics_table(rows: list[TopicRow]) -> FittedTable:
             "out" if out else "in",
             Text(row.name) if not row.idle else Text(row.name, style="dim"),
             row.qos,
+            row.policy_from,
             rate(row.per_s),
             bytes_rate(row.bytes_per_s),
             str(row.messages),
@@ -88,14 +91,15 @@ def topics_table(rows: list[TopicRow]) -> FittedTable:
 
 def _out(topic: TopicReport) -> TopicRow:
     return TopicRow(
-        topic.name, None, topic.qos, topic.accepted_per_s, topic.accepted_bytes_per_s,
-        topic.sent, topic.queued, failed(topic), None, None, None, is_idle(topic),
+        topic.name, None, topic.qos, topic.policy_from, topic.accepted_per_s,
+        topic.accepted_bytes_per_s, topic.sent, topic.queued, failed(topic),
+        None, None, None, is_idle(topic),
     )  # fmt: skip
 
 
 def _in(topic: ReceivedTopicReport) -> TopicRow:
     return TopicRow(
-        topic.republished_as or topic.name, topic.src, "", topic.delivered_per_s,
+        topic.republished_as or topic.name, topic.src, "", "", topic.delivered_per_s,
         topic.delivered_bytes_per_s, topic.delivered, 0, sum(topic.dropped.values()), topic.pdr,
         topic.age_ms_last, topic.age_ms_p99, is_idle(topic),
     )  # fmt: skip

@@ -34,7 +34,6 @@ from sdrlinkd.fleet.ros.topics import ENCODING, About, Topics
 from sdrlinkd.fleet.samples import Sample
 from sdrlinkd.fleet.session import Session
 from sdrlinkd.fleet.topics import matches
-from sdrlinkd.link import DEFAULT_POLICY
 
 NOTHING = About()
 SETTLED_S = 0.2
@@ -176,10 +175,10 @@ class RosSide:
 
     def _about_of(self, told: TopicKey) -> About | None:
         """What is known of a topic; None: nothing yet."""
-        if self._setup.registry.by_name(told.topic) is None:
+        topic = self._setup.registry.by_name(told.topic)
+        if topic is None:
             return self._about.get(told)
-        policy = self._setup.named_policies.get(told.topic, DEFAULT_POLICY)
-        return About(latched=policy.latched)
+        return About(latched=self._setup.policies[topic.id].latched)
 
     def _put(self, told: TopicKey, item: Upward, about: About) -> None:
         passed = item.passed

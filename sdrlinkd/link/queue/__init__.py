@@ -23,6 +23,7 @@ from sdrlinkd.link.queue.lives import Lives
 from sdrlinkd.link.queue.message import Lane, Outgoing
 from sdrlinkd.link.queue.outbox import Outbox
 from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
+from sdrlinkd.link.queue.policy_table import PolicyTable, TypePolicies
 
 __all__ = [
     "DEFAULT_POLICY",
@@ -45,10 +46,12 @@ __all__ = [
     "Offer",
     "Outbox",
     "Outgoing",
+    "PolicyTable",
     "RxTally",
     "Step",
     "TopicPolicy",
     "TxTally",
+    "TypePolicies",
     "balance",
     "lifespan_of",
     "most_expanded",

@@ -7,7 +7,8 @@ from math import inf
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.params import LinkParams
-from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
+from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, QOS_BY_LABEL, Overrides, Qos
+from sdrlinkd.link.queue.child_frames import key_of
 from sdrlinkd.link.queue.compression import most_expanded
 from sdrlinkd.link.queue.latched import Offer
 from sdrlinkd.link.queue.ledger import TxTally, tx_balance
@@ -80,6 +81,14 @@ class Intake:
                 self._dst, self._has_control, dictionary, self._first_large
             )
 
+    def keyed(self, topic_id: int, payload: bytes, wishes: Overrides) -> Overrides:
+        """`wishes` with a producer key for a latched message, if the topic's policy makes one."""
+        policy = self._topics[topic_id].policy
+        if wishes.key or not policy.latched:
+            return wishes
+        key = key_of(payload, policy)
+        return wishes._replace(key=key) if key else wishes
+
     def submit(
         self,
         topic_id: int,
@@ -143,7 +152,7 @@ class Intake:
     def begin_anew(self) -> None:
         """Forget the arrival times of messages, as another clock starts."""
         for topic in self._topics.values():
-            topic.apply(topic.policy)
+            topic.apply(topic.policy, topic.command)
 
     def tally(self, topic_id: int) -> TxTally:
         """The message counters of one topic."""
@@ -153,25 +162,46 @@ class Intake:
         """The policy in force for a topic."""
         return self._topics[topic_id].policy
 
-    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
-        """Change a topic's policy from now on."""
+    def command(self, topic_id: int) -> TopicPolicy:
+        """The policy in force for a topic's messages to one robot."""
+        return self._topics[topic_id].command
+
+    def set_policy(
+        self,
+        topic_id: int,
+        policy: TopicPolicy,
+        command: TopicPolicy | None = None,
+        origin: str = "",
+    ) -> None:
+        """Change a topic's policy from now on.
+
+        `command` is for messages that are sent to one robot; None: the same. `origin` says where
+        it comes from, for reports.
+        """
         topic = self._topics[topic_id]
-        if policy != topic.policy:
-            topic.apply(policy)
+        topic.origin = origin
+        if (policy, command or policy) != (topic.policy, topic.command):
+            topic.apply(policy, command)
 
     def destination(self, topic_id: int) -> int:
         """Default destination robot of a topic's messages."""
         return self._topics[topic_id].dst
 
-    def treatment(self, topic_id: int) -> tuple[Qos, int]:
-        """Default class and priority of a topic's messages."""
+    def treatment(self, topic_id: int, dst: int | None = None) -> tuple[Qos, int]:
+        """Class and priority of a topic's messages to `dst` (None: its default destination)."""
         topic = self._topics[topic_id]
-        return topic.qos, topic.priority
+        policy = topic.policy_to(topic.dst if dst is None else dst)
+        return QOS_BY_LABEL[policy.qos], policy.priority
 
     def lifespan(self, topic_id: int, qos: Qos | None = None) -> Lifespan:
         """Default lifespan of a topic's messages of class `qos` (None: the topic's class)."""
         topic = self._topics[topic_id]
-        return lifespan_of(topic.policy, topic.qos if qos is None else qos, self._classes)
+        policy = topic.policy_to(topic.dst)
+        return lifespan_of(policy, topic.qos if qos is None else qos, self._classes)
+
+    def needed_bytes_per_s(self, topic_id: int) -> float:
+        """What the channel must carry for the last command that was refused as too slow."""
+        return self._topics[topic_id].needed_bytes_per_s
 
     def report_relayed(self) -> RelayReport:
         """The report on PDUs that this robot relays."""
@@ -191,6 +221,7 @@ class Intake:
             priority=priority,
             lifespan_s=lifespan.seconds if lifespan.source else None,
             lifespan_from=lifespan.source,
+            policy_from=self._topics[topic.id].origin,
             accepted=tally.accepted,
             sent=tally.sent,
             sent_bytes=tally.sent_bytes,
@@ -232,7 +263,7 @@ class Intake:
         if FIRST_NUMBER <= topic_id <= PARTS:
             return DEFAULT_POLICY.priority
         topic = self._topics.get(topic_id)
-        return 0 if topic is None else topic.priority
+        return 0 if topic is None else topic.policy.priority
 
     def _enqueue(
         self,
@@ -245,8 +276,11 @@ class Intake:
     ) -> str | None:
         qos, priority, dst, lifespan_s, age_s, receipt, key = wishes
         topic = self._topics[topic_id]
+        dst = topic.dst if dst is None else dst
+        policy = topic.policy_to(dst)
+        qos = QOS_BY_LABEL[policy.qos] if qos is None else qos
         if lifespan_s is None:
-            lifespan_s = self.lifespan(topic_id, qos).seconds
+            lifespan_s = lifespan_of(policy, qos, self._classes).seconds
         if age_s <= UNLIKELY_AGE_S or lifespan_s < inf:
             at -= age_s
         frame = topic.deflated.shrink(payload) if topic.deflated else None
@@ -254,8 +288,7 @@ class Intake:
             frame = None
         if frame is not None:
             payload = frame
-        qos = topic.qos if qos is None else qos
-        wants_stamp = topic.stamp or (bool(receipt) and self._has_control)
+        wants_stamp = topic.stamps(policy) or (bool(receipt) and self._has_control)
         number, parting = self._own.number(topic_id, key), None
         if len(payload) > max_size(self._pdu_size, number):
             parting = self._parting(topic, number, len(payload), qos, wants_stamp)
@@ -266,25 +299,31 @@ class Intake:
             topic_id,
             payload,
             qos,
-            topic.priority if priority is None else priority,
-            topic.dst if dst is None else dst,
+            policy.priority if priority is None else priority,
+            dst,
             at,
             at + lifespan_s,
             wants_stamp,
             topic.tally,
             # Without a control channel its receipt was already answered as unknown.
             receipt=receipt if self._has_control else "",
-            key=key,
+            key=key or key_of(payload, policy),
             number=number,
             parting=parting,
-            is_command=qos is Qos.URGENT or topic.policy.deadman_s > 0,
+            is_command=qos is Qos.URGENT or policy.deadman_s > 0,
             is_compressed=frame is not None,
         )
         if message.expires_at <= now:
             # An expired message must not displace a fresh one.
             self._outbox.lives.drop(message, "tx_expired")
             return "tx_expired"
-        return self._outbox.put(message, topic.policy, bytes_per_s)
+        needs = len(payload) / (message.expires_at - now)
+        if message.is_command and needs > bytes_per_s:
+            # It would take the air from others in vain.
+            topic.needed_bytes_per_s = needs
+            self._outbox.lives.drop(message, "tx_too_slow")
+            return "tx_too_slow"
+        return self._outbox.put(message, policy, bytes_per_s)
 
     def _may_inflate(self, topic: TopicState, frame: int, size: int) -> bool:
         """Whether receivers take a message of `size` octets in a frame of `frame` octets."""

@@ -305,7 +305,8 @@ class QueuedOfTopic:
     """One topic's messages of which no part has been sent yet, the oldest first."""
 
     messages: OrderedDict[Outgoing, None] = field(default_factory=OrderedDict)
-    by_key: dict[str, OrderedDict[Outgoing, None]] = field(default_factory=dict)
+    by_key: dict[tuple[str, int], OrderedDict[Outgoing, None]] = field(default_factory=dict)
+    """By producer key and destination."""
     n_bytes: int = 0
 
     @property
@@ -313,21 +314,21 @@ class QueuedOfTopic:
         """The oldest message."""
         return next(iter(self.messages))
 
-    def of_key(self, key: str) -> OrderedDict[Outgoing, None]:
-        """Messages of one producer key; without a key, those without one."""
-        return self.by_key.get(key) or NONE_QUEUED
+    def like(self, message: Outgoing) -> OrderedDict[Outgoing, None]:
+        """Messages with the producer key and the destination of this one."""
+        return self.by_key.get((message.key, message.dst)) or NONE_QUEUED
 
     def add(self, message: Outgoing) -> None:
         """Add the newest message."""
         self.messages[message] = None
-        self.by_key.setdefault(message.key, OrderedDict())[message] = None
+        self.by_key.setdefault((message.key, message.dst), OrderedDict())[message] = None
         self.n_bytes += len(message.payload)
 
     def remove(self, message: Outgoing) -> None:
         """Remove a message."""
         del self.messages[message]
-        of_key = self.by_key[message.key]
-        del of_key[message]
-        if not of_key:
-            del self.by_key[message.key]
+        key = message.key, message.dst
+        del self.by_key[key][message]
+        if not self.by_key[key]:
+            del self.by_key[key]
         self.n_bytes -= len(message.payload)

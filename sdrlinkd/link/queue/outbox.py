@@ -60,8 +60,8 @@ class Outbox:
             return "tx_overflow_new"
         topic, depth = self._by_topic.get(message.topic_id), policy.kept
         if topic is not None:
-            while depth and len(of_key := topic.of_key(message.key)) >= depth:
-                self.lives.drop(self._withdraw_waiting(next(iter(of_key))), "tx_superseded")
+            while depth and len(like := topic.like(message)) >= depth:
+                self.lives.drop(self._withdraw_waiting(next(iter(like))), "tx_superseded")
             of_topic = min(policy.queue_bytes or inf, (policy.queue_s or inf) * bytes_per_s)
             while topic.messages and topic.n_bytes + size > of_topic:
                 self.lives.drop(self._withdraw_waiting(topic.oldest), "tx_topic_full")

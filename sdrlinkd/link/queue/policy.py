@@ -1,5 +1,6 @@
 """The policy of a topic, at the sender and at the receiver."""
 
+from collections.abc import Collection, Mapping
 from math import inf
 from typing import Annotated, Any, Literal
 
@@ -19,6 +20,7 @@ class TopicPolicy(
     frozen=True,
     kw_only=True,
     forbid_unknown_fields=True,
+    dict=True,
     rename={"from_": "from"},
 ):
     """Policy of one topic; a producer may override class, priority, lifespan and destination."""
@@ -33,8 +35,11 @@ class TopicPolicy(
     history: Literal["keep_last", "keep_all"] = "keep_last"
     """Queue history: keep_last keeps the last `depth` messages, keep_all ignores `depth`."""
     depth: Amount = 0
-    """Most messages of a producer key that wait in the queue, where newer ones replace older ones;
-    0: no limit but the queue's."""
+    """Most messages of a producer key to one destination that wait in the queue, where newer ones
+    replace older ones; 0: no limit but the queue's."""
+    key: Literal["producer", "child_frames"] = "producer"
+    """Key of messages whose producer gives none: producer: they have the same one; child_frames:
+    the child frames of a tf2_msgs/TFMessage, so that `depth` holds for each."""
     lifespan_s: Positive | None = None
     """Age in s after which a message is neither sent nor handed over. If absent, the lifespan of
     its class applies, at the sender only."""
@@ -47,7 +52,8 @@ class TopicPolicy(
     """transient_local: late joiners get the last `depth` messages (at least one) of each producer
     key; volatile: they do not."""
     offer: bool = True
-    """Whether the QoS that a producer declares sets the keys that have their default value here."""
+    """Whether keys that are absent here come from the topic's message type, and from the QoS that
+    its producer declares; false: they have the default values of this list."""
     dst: Annotated[int, Meta(ge=0, le=255)] | None = None
     """Destination robot; absent: `link.dst`."""
     from_: list[Annotated[int, Meta(ge=0, le=254)]] = []
@@ -82,6 +88,24 @@ class TopicPolicy(
     queue_s: Annotated[float, Meta(ge=0)] = 0.0
     """Most airtime in s that waits in the queue, beyond which the oldest messages are dropped; 0:
     no limit."""
+
+    def given_in(self, keys: Collection[str]) -> "TopicPolicy":
+        """This policy, of which a file gives `keys`, with their default values or others."""
+        fields = {field.encode_name: field.name for field in msgspec.structs.fields(self)}
+        named = msgspec.structs.replace(self)
+        msgspec.structs.force_setattr(named, "_given", tuple(fields[key] for key in keys))
+        return named
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """Fields that were given, with their values; unless told, those without default value."""
+        named: Collection[str] | None = self.__dict__.get("_given")
+        if named is None:
+            named = [
+                field for field in self.__struct_fields__
+                if getattr(self, field) != getattr(DEFAULT_POLICY, field)
+            ]  # fmt: skip
+        return {field: getattr(self, field) for field in named}
 
     @property
     def kept(self) -> int:

@@ -1,15 +1,21 @@
 """Decides whether a complete message is handed over, by its topic's policy."""
 
-from collections.abc import Mapping
 from math import inf
 
-from sdrlinkd.link.queue import DEFAULT_POLICY, Inflated, TopicPolicy, most_expanded
+from sdrlinkd.link.queue import (
+    DEFAULT_POLICY,
+    Inflated,
+    PolicyTable,
+    TopicPolicy,
+    most_expanded,
+)
 from sdrlinkd.link.receive.delivered import CDR_HEADER_SIZE, Retain
 from sdrlinkd.link.topics import HeardTopic
 from sdrlinkd.wire import Registry
 
 RETAINED_KEYS = 8
 """Producer keys of a topic of the registry for which a receiver keeps messages."""
+_DEFAULTS = DEFAULT_POLICY, DEFAULT_POLICY
 
 
 class Acceptance:
@@ -29,22 +35,28 @@ class Acceptance:
         self._has_control = registry.has_control
         self._inflated = inflated
         self._max_expanded = max_expanded
-        self._policies: dict[int, TopicPolicy] = {}
-        self._named: Mapping[str, TopicPolicy] = {}
+        self._policies: dict[int, tuple[TopicPolicy, TopicPolicy]] = {}
+        """Of the registry's topics, and of their messages to one robot."""
+        self._table = PolicyTable({})
 
-    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
-        """Treat messages of a topic by `policy` from now on."""
-        self._policies[topic_id] = policy
+    def set_policy(
+        self, topic_id: int, policy: TopicPolicy, command: TopicPolicy | None = None
+    ) -> None:
+        """Treat messages of a topic by `policy` from now on.
 
-    def set_named(self, policies: Mapping[str, TopicPolicy]) -> None:
-        """Treat messages of declared topics by the policy of their name from now on."""
-        self._named = policies
+        `command` is for messages that are sent to one robot; None: the same.
+        """
+        self._policies[topic_id] = policy, command or policy
+
+    def set_table(self, table: PolicyTable) -> None:
+        """Treat messages of declared topics by the policies of `table` from now on."""
+        self._table = table
 
     @property
     def delivers_unproven(self) -> bool:
         """Whether a policy lets messages through from robots that have not proven to be alive."""
-        policies = (*self._policies.values(), *self._named.values())
-        return any(policy.unproven == "deliver" for policy in policies)
+        of_registry = any(policy.unproven == "deliver" for policy, _ in self._policies.values())
+        return of_registry or self._table.delivers_unproven
 
     def takes_from(self, topic: HeardTopic, src: int) -> bool:
         """Whether messages of a topic are taken from robot `src`.
@@ -58,25 +70,29 @@ class Acceptance:
         """Whether messages of a topic are handed over from robots that are not proven."""
         return self._takes_all or self.policy_of(topic).unproven == "deliver"
 
-    def policy_of(self, topic: HeardTopic | None) -> TopicPolicy:
-        """The policy of a topic, by default the default policy."""
+    def policy_of(self, topic: HeardTopic | None, *, to_one: bool = False) -> TopicPolicy:
+        """The policy of a topic, by default the default policy.
+
+        `to_one`: that of its messages to one robot.
+        """
         if topic is None:
             return DEFAULT_POLICY
         if topic.about is not None:
-            return self._named.get(topic.at_origin, DEFAULT_POLICY)
-        return self._policies.get(topic.base, DEFAULT_POLICY)
+            return self._table.of(topic.at_origin, topic.type, is_command=to_one)
+        policy, command = self._policies.get(topic.base, _DEFAULTS)
+        return command if to_one else policy
 
-    def commands(self, topic: HeardTopic | None) -> bool:
+    def commands(self, topic: HeardTopic | None, *, to_one: bool = False) -> bool:
         """Whether messages of a topic are commands, whose absence stops a robot."""
-        return topic is not None and self.policy_of(topic).deadman_s > 0
+        return topic is not None and self.policy_of(topic, to_one=to_one).deadman_s > 0
 
-    def drops_late(self, topic: HeardTopic) -> bool:
+    def drops_late(self, topic: HeardTopic, *, to_one: bool = False) -> bool:
         """Whether a message of a topic is dropped if it comes after a newer one.
 
         Where only the last message of a producer is kept, an older one must not take its place.
         """
         is_last_kept = topic.about is not None and self.retain(topic).depth == 1
-        return is_last_kept or self.policy_of(topic).drops_late
+        return is_last_kept or self.policy_of(topic, to_one=to_one).drops_late
 
     def retain(self, topic: HeardTopic) -> Retain:
         """How many messages of a topic are kept for consumers that come later."""
@@ -94,13 +110,15 @@ class Acceptance:
         origin_at: float | None,
         took_s: float,
         now: float,
+        *,
+        to_one: bool = False,
     ) -> tuple[bytes, str | None]:
         """(the message as submitted, the ledger's reason for dropping it or None).
 
         `origin_at` is when the message was submitted, None if no STAMP came. It was `took_s` on
-        the air, which do not count unless it is a command.
+        the air, which do not count unless it is a command. `to_one`: it was sent to one robot.
         """
-        policy, reason = self.policy_of(topic), None
+        policy, reason = self.policy_of(topic, to_one=to_one), None
         if is_compressed:
             most = policy.max_bytes or self._max_expanded
             if not policy.max_bytes and not self._is_sealed:

@@ -79,8 +79,9 @@ class Completion:
             return
         took_s = message.heard_at - message.began_at
         payload, refused = self._acceptance.judge(
-            topic, message.payload, message.is_compressed, message.origin.at, took_s, now
-        )
+            topic, message.payload, message.is_compressed, message.origin.at, took_s, now,
+            to_one=message.to_one,
+        )  # fmt: skip
         if refused is not None:
             self._end(message, refused, now, events)
             return
@@ -96,14 +97,14 @@ class Completion:
             Delivered(
                 src, topic.base, payload, tally.delivered, lost_pdus, message.origin.at,
                 message.heard_at, message.hops_left, message.snr_db, message.began_at,
-                message.ended_at, number, topic, message.name,
+                message.ended_at, number, topic, message.name, message.to_one,
             )
         )  # fmt: skip
 
     def _is_outdated(self, message: Whole, topic: HeardTopic) -> bool:
         """Whether a message comes after a newer one, where that matters."""
         origin_at, key = message.origin.at, (message.src, message.number)
-        if origin_at is None or not self._acceptance.drops_late(topic):
+        if origin_at is None or not self._acceptance.drops_late(topic, to_one=message.to_one):
             return False
         newest_at = self._newest_at.get(key, -inf)
         self._newest_at[key] = max(newest_at, origin_at)

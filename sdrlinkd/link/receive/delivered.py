@@ -71,6 +71,8 @@ class Delivered(NamedTuple):
     series: int = 0
     topic: HeardTopic = UNNAMED
     name: MessageName = UNNAMED_MESSAGE
+    to_one: bool = False
+    """Whether it was sent to one robot."""
 
     def parts(self, now: float) -> Parts:
         """The parts of the message's age at `now`; without a STAMP the wait counts as 0."""

@@ -284,7 +284,7 @@ class Inbox:
             message = Whole(
                 src, topic_id, payload, pdu.compressed, self._ages.take(src, *stamped), stamped, at,
                 admitted.ended_at, reassembly.began_at, pdu.hop, neighbor.snr_db,
-                name, admitted.is_proven,
+                name, admitted.is_proven, pdu.dst != BROADCAST,
             )  # fmt: skip
             self._completion.take(message, now, events)
         if reassembly.lost:

@@ -1,9 +1,9 @@
 """The receive side as one object, from a PDU heard to a message handed over."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable
 
 from sdrlinkd.link.params import LinkParams, ReassemblyParams
-from sdrlinkd.link.queue import Inflated, TopicPolicy
+from sdrlinkd.link.queue import Inflated, PolicyTable, TopicPolicy
 from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.air_heard import AirHeard
 from sdrlinkd.link.receive.completion import Completion
@@ -109,20 +109,26 @@ class Reception:
 
     def deliver(self, message: Delivered, now: float) -> float | None:
         """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
-        return self._handover.deliver(message, self._acceptance.policy_of(message.topic), now)
+        policy = self._acceptance.policy_of(message.topic, to_one=message.to_one)
+        return self._handover.deliver(message, policy, now)
 
     def retain(self, message: Delivered) -> Retain:
         """How many messages of this one's topic and source are kept for later consumers."""
         return self._acceptance.retain(message.topic)
 
-    def set_named(self, policies: Mapping[str, TopicPolicy]) -> None:
-        """Treat messages of declared topics by the policy of their name from now on."""
-        self._acceptance.set_named(policies)
+    def set_table(self, table: PolicyTable) -> None:
+        """Treat messages of declared topics by the policies of `table` from now on."""
+        self._acceptance.set_table(table)
 
-    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
-        """Treat messages of a topic by `policy` from now on."""
-        self._acceptance.set_policy(topic_id, policy)
-        if not policy.deadman_s:
+    def set_policy(
+        self, topic_id: int, policy: TopicPolicy, command: TopicPolicy | None = None
+    ) -> None:
+        """Treat messages of a topic by `policy` from now on.
+
+        `command` is for messages that are sent to one robot; None: the same.
+        """
+        self._acceptance.set_policy(topic_id, policy, command)
+        if not (policy.deadman_s or (command or policy).deadman_s):
             self._handover.forget(topic_id)
 
     def take_waits(self, src: int, waits: Waits) -> None:

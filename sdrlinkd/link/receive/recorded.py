@@ -5,7 +5,7 @@ from collections import deque
 
 from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.topics import HeardTopics
-from sdrlinkd.wire import Pdu
+from sdrlinkd.wire import BROADCAST, Pdu
 
 COMMANDS_S = 10.0
 """Time in s for which a PDU with commands is known again."""
@@ -34,7 +34,9 @@ class RecentCommands:
     def has_heard(self, pdu: Pdu, octets: bytes, at: float) -> bool:
         """Whether a PDU that came at `at` holds commands and came before; if not, it is noted."""
         commands, topic = self._acceptance.commands, self._topics.topic
-        if not any(commands(topic(pdu.src, entry.topic_id)) for entry in pdu.entries):
+        to_one = pdu.dst != BROADCAST
+        heard = (topic(pdu.src, entry.topic_id) for entry in pdu.entries)
+        if not any(commands(each, to_one=to_one) for each in heard):
             return False
         order = self._order
         while order and (order[0][0] < at - COMMANDS_S or len(order) > MOST_KEPT):

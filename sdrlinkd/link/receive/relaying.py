@@ -9,7 +9,7 @@ from sdrlinkd.link.receive.duplicates import SequenceTrack
 from sdrlinkd.link.receive.pdu_read import PduRead
 from sdrlinkd.link.routes import PduToRelay, Routes
 from sdrlinkd.link.topics import HeardTopics
-from sdrlinkd.wire import CONTROL_TOPIC_ID, PDU_NUMBERS, Pdu
+from sdrlinkd.wire import BROADCAST, CONTROL_TOPIC_ID, PDU_NUMBERS, Pdu
 
 
 class Relaying:
@@ -56,7 +56,7 @@ class Relaying:
             if origin_at is None:
                 return inf
             topic = self._topics.topic(pdu.src, topic_id)
-            policy = self._acceptance.policy_of(topic)
+            policy = self._acceptance.policy_of(topic, to_one=pdu.dst != BROADCAST)
             if entry.total > 1 and not policy.is_command:
                 return inf
             until = max(until, origin_at + policy.own_lifespan_s)

@@ -38,6 +38,8 @@ class Whole(NamedTuple):
     name: MessageName = UNNAMED_MESSAGE
     is_proven: bool = True
     """Whether its source has proven to be alive."""
+    to_one: bool = False
+    """Whether it was sent to one robot."""
 
 
 @dataclass(slots=True)

@@ -16,18 +16,22 @@ MINUTE_S = 60.0
 STEP_S = 2.0
 FULL = 0.85
 """Share of airtime from which the channel counts as full; policies leave about the rest idle."""
-OVERFLOW = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_superseded", "tx_expired")
+OVERFLOW = (
+    "tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_superseded", "tx_expired",
+    "tx_too_slow",
+)  # fmt: skip
 """Reasons of drops that more airtime would have prevented."""
 
 
 class Told(NamedTuple):
-    """Where a policy comes from: the file, the keys that were set since, and the QoS that its
-    producer offers, in words.
+    """Where a policy comes from: the file, the keys that were set since, the QoS that its producer
+    offers, in words, and the message type, if a key is by it.
     """
 
     source: str
     changed: Collection[str]
     offered: str = ""
+    by_type: str = ""
 
 
 class AirUse(NamedTuple):
@@ -64,7 +68,7 @@ class Why:
         policy, tally = self._intake.policy(topic_id), self._intake.tally(topic_id)
         came = self._lately(("accepted", topic_id), tally.accepted, now)
         sent = self._lately(("sent", topic_id), tally.sent, now)
-        lines = [self._treatment(name, policy, told, topic_id)]
+        lines = [self._treatment(name, policy, told, topic_id), *self._commands(topic_id)]
         if not came:
             lines.append(
                 "no local program sent a message in the last minute"
@@ -106,9 +110,19 @@ class Why:
         if policy.durability == "transient_local":
             n = policy.latched
             line += f", last {'message' if n == 1 else f'{n} messages'} kept for late joiners"
+        by_type = f"by its type {told.by_type}" if told.by_type else ""
         by = f"set while running: {', '.join(sorted(told.changed))}" if told.changed else ""
         offered = f"the producer's offer: {told.offered}" if told.offered else ""
-        return f"{line} ({'; '.join(each for each in (told.source, offered, by) if each)})"
+        return f"{line} ({'; '.join(each for each in (told.source, by_type, offered, by) if each)})"
+
+    def _commands(self, topic_id: int) -> list[str]:
+        """A sentence on messages to one robot, if they are treated otherwise."""
+        policy, command = self._intake.policy(topic_id), self._intake.command(topic_id)
+        if (command.qos, command.lifespan_s) == (policy.qos, policy.lifespan_s):
+            return []
+        lives = "" if command.lifespan_s is None else f", lifespan {_seconds(command.lifespan_s)}"
+        stops = f", dead-man after {_seconds(command.deadman_s)}" if command.deadman_s else ""
+        return [f"sent to one robot: class {command.qos}{lives}{stops}"]
 
     def _said(self, reason: str, topic_id: int, policy: TopicPolicy, told: Told) -> str:
         if reason == "tx_throttled":
@@ -122,6 +136,12 @@ class Why:
             return f"replaced by newer ones: depth {policy.kept}"
         if reason == "tx_expired":
             return self._too_old(topic_id, policy)
+        if reason == "tx_too_slow":
+            needs = 8e-6 * self._intake.needed_bytes_per_s(topic_id)
+            return (
+                "refused: a command that cannot arrive within its lifespan; the last one needs "
+                f"{needs:.3g} Mbit/s"
+            )
         if reason in ("tx_overflow_old", "tx_overflow_new", "tx_topic_full"):
             return f"shed: {TX_REASONS[reason]}"
         return f"dropped: {TX_REASONS[reason]}"

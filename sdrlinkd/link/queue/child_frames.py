@@ -1,7 +1,9 @@
-"""The child frames in the CDR of a tf2_msgs/TFMessage, which tell its publishers apart."""
+"""The key of a message whose producer gives none: its child frames, if its policy says so."""
 
 import hashlib
 import struct
+
+from sdrlinkd.link.queue.policy import TopicPolicy
 
 MOST_TRANSFORMS = 1000
 MAX_KEY_BYTES = 32
@@ -11,8 +13,19 @@ _POSE = 7 * 8
 """Octets of the translation and the rotation."""
 
 
+def key_of(payload: bytes, policy: TopicPolicy) -> str:
+    """The key of a message without one; empty if it has the same as all others of its topic."""
+    frames = child_frames(payload) if policy.key == "child_frames" else None
+    if not frames:
+        return ""
+    text = ",".join(frames)
+    if len(text.encode()) <= MAX_KEY_BYTES:
+        return text
+    return hashlib.blake2b(text.encode(), digest_size=MAX_KEY_BYTES // 2).hexdigest()
+
+
 def child_frames(cdr: bytes) -> list[str] | None:
-    """The child frames of a TFMessage, sorted; None if these octets are none."""
+    """The child frames in a tf2_msgs/TFMessage as CDR, sorted; None if the octets are none."""
     order = "<" if cdr[1:2] == b"\x01" else ">"
     frames, at = set(), ENCAPSULATION
     try:
@@ -29,17 +42,6 @@ def child_frames(cdr: bytes) -> list[str] | None:
     except (struct.error, UnicodeDecodeError):
         return None
     return sorted(frames) if len(cdr) >= at else None
-
-
-def producer_key(cdr: bytes) -> str:
-    """A producer key for a message of /tf_static: its child frames, or a digest of them."""
-    frames = child_frames(cdr)
-    if not frames:
-        return ""
-    text = ",".join(frames)
-    if len(text.encode()) <= MAX_KEY_BYTES:
-        return text
-    return hashlib.sha256(text.encode()).hexdigest()[:MAX_KEY_BYTES]
 
 
 def _aligned(at: int, to: int) -> int:
