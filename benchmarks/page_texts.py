@@ -18,8 +18,11 @@ TEXTS = {
     ),
     "defaults": (
         "A team with the files that `init` writes for the simulated air, as whole links in virtual "
-        "time; only the MCS is overridden. Producers declare their topics, for which nothing is "
-        "configured. *before* is an earlier run of the same command (`--before`)."
+        "time; only the MCS is overridden, and in `..._adaptive` not even that. Producers declare "
+        "their topics, for which nothing is configured. `daemons_...`: whole daemons and the "
+        "simulated air's hub in real time, at a rate that this machine keeps up with. "
+        "`fair_...`: random mixes of topics on one link. *before* is an earlier run of the same "
+        "command (`--before`)."
     ),
     "fleet": (
         "Real daemons, gateways and a Zenoh router on one machine. An air of PDUs carries what the "

@@ -43,6 +43,20 @@ ROWS = {
         *(f"big_{big}_of_the_rest_pct" for big in ("200kB", "1MB", "3MB")),
         "400kB_best_effort", "1500kB_reliable",
         *(f"alone_{size}_pct" for size in ("50kB", "400kB", "800kB", "1500kB")),
+        *(
+            f"{each}_{air}" for air in ("1ch", "full_duplex", "1ch_adaptive")
+            for each in ("laser", "laser_std", "laser_p99", "image", "image_pct")
+        ),
+        *(
+            f"laser_after_{pause}_{each}" for pause in ("22s", "random_pauses")
+            for each in ("over_before", "p99_ms")
+        ),
+        *(f"outage_first_{topic}_s" for topic in ("odom", "scan", "cmd_vel")), "outage_oldest_s",
+        "latched_depth_5", "50_reliable_at_once", "two_best_effort",
+        "fair_wait_over_bound", "fair_bounds_broken",
+        *(f"daemons_odom_beside_200kB_{each}" for each in ("pct", "p50_ms", "p99_ms")),
+        "daemons_400kB_best_effort", "daemons_image_ms", "daemons_image_pct",
+        *(f"daemons_laser_{each}" for each in ("ms", "std_ms", "p99_ms", "pct")),
     },
     "fleet": {
         *(
