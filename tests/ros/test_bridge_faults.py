@@ -38,7 +38,7 @@ DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 def test_what_comes_from_the_air_is_published_only_under_a_type_that_it_is(
     start_daemon, start, hub
 ):
-    one = start_daemon(config(hub, 1))
+    one = start_daemon(config(hub, 1, "[topic.odom]\ndepth = 0\n"))
     two = Robot(start, start_daemon(config(hub, 2)), "-p", 'restamp:=["odom"]').watched().bridged()
     topic, kind, _ = ODOM
     two.node.sub(topic="/robot_1/odom", type=kind)
