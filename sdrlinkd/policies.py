@@ -16,7 +16,8 @@ log = logging.getLogger("sdrlinkd")
 
 FIXED = ("dictionary", "from_", "key", "offer", "stamp", "stop", "unproven")
 """Keys that cannot be changed at run time: receivers must know two of them, the stop message is
-made at the start, what is set wins over an offer anyway, and whom to trust is for the file."""
+made at the start, what is set wins over an offer anyway, messages that wait have their key, and
+whom to trust is for the file."""
 
 _SETTABLE = [key for key in TopicPolicy.__struct_fields__ if key not in FIXED]
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from random import Random
-from statistics import mean, pstdev
+from statistics import pstdev
 from typing import Literal
 
 from backends import Outage
@@ -98,9 +98,10 @@ def _whole(duration_s: float) -> Iterator[Row]:
     lasers_s, images_s = ages["scan"].values(), ages["image"].values()
     n, m = len(laser.times), len(image.times)
     for row, value, unit in (
-        ("laser_ms", 1e3 * mean(lasers_s), "ms"), ("laser_std_ms", 1e3 * pstdev(lasers_s), "ms"),
+        ("laser_ms", 1e3 * _mean(lasers_s), "ms"),
+        ("laser_std_ms", 1e3 * pstdev(lasers_s or [0.0]), "ms"),
         ("laser_p99_ms", 1e3 * _quantile(lasers_s, 0.99), "ms"),
-        ("laser_pct", 100 * len(lasers_s) / n, "%"), ("image_ms", 1e3 * mean(images_s), "ms"),
+        ("laser_pct", 100 * len(lasers_s) / n, "%"), ("image_ms", 1e3 * _mean(images_s), "ms"),
         ("image_pct", 100 * len(images_s) / m, "%"),
     ):  # fmt: skip
         yield Row(f"daemons_{row}", value, unit, None, "more" if unit == "%" else "less",
@@ -158,10 +159,10 @@ def _seed_workload(seed: int, duration_s: float) -> Iterator[Row]:
         arrived = 100 * sum(i in images_s for i in due) / len(due)
         has_target = air == HALF_DUPLEX
         for row, value, unit, target in (
-            ("laser", 1e3 * mean(lasers_s.values()), "ms", 4.5),
+            ("laser", 1e3 * _mean(lasers_s.values()), "ms", 4.5),
             ("laser_std", 1e3 * pstdev(lasers_s.values()), "ms", 1.0),
             ("laser_p99", 1e3 * _quantile(lasers_s.values(), 0.99), "ms", None),
-            ("image", 1e3 * mean(images_s.values()), "ms", 170.0),
+            ("image", 1e3 * _mean(images_s.values()), "ms", 170.0),
             ("image_pct", arrived, "%", 99.9),
         ):
             better: Literal["more", "less"] = "more" if unit == "%" else "less"
@@ -189,7 +190,7 @@ def _pauses(seed: int, n_pauses: int) -> Iterator[Row]:
         ages_s = found.ages_s["scan"]
         before_s, after_s = ([ages_s[i] for i in each if i in ages_s] for each in (before, after))
         note, n = f"{len(pauses_s)} pauses; {_told(found)}", len(after_s)
-        ratio = mean(after_s) / mean(before_s)
+        ratio = _mean(after_s) / _mean(before_s)
         yield Row(f"laser_after_{name}_over_before", ratio, "", 1.1, "less", n, note=note)
         p99_ms = 1e3 * _quantile(after_s, 0.99)
         yield Row(f"laser_after_{name}_p99_ms", p99_ms, "ms", None, "less", n, note=note)
@@ -236,6 +237,10 @@ def _depths(seed: int) -> Iterator[Row]:
 def _times(hz: float, duration_s: float, rng: Random) -> Sequence[float]:
     first = BEGIN_S + rng.random() / hz
     return [first + i / hz for i in range(int(hz * duration_s))]
+
+
+def _mean(values: Collection[float]) -> float:
+    return sum(values) / len(values) if values else float("inf")
 
 
 def _quantile(values: Collection[float], share: float) -> float:

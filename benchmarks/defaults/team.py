@@ -118,7 +118,7 @@ def written(directory: Path, mcs: int | None, rate: str = "") -> dict[int, Path]
         if name != REGISTRY:
             lines = text.splitlines()
             if mcs is not None:
-                fixed = text.replace("mcs = 1 ", f"mcs = {mcs} ").replace("adapt = true", "")
+                fixed = text.replace("\nmcs = 1 ", f"\nmcs = {mcs} ").replace("adapt = true", "")
                 lines = fixed.splitlines()
             declared = [line for line in lines if not line.startswith("registry =")]
             (directory / name).write_text("\n".join(declared))

@@ -108,7 +108,7 @@ def _modem(team: Team) -> str:
     if radio.is_real:
         lines.append(_text("frequency_hz", team.frequency, "one that antenna and licence cover"))
     if radio.shares_air and team.robots > 1:
-        told = f"QPSK 1/2, for a robot whose reports are missing; {_LISTED}"
+        told = f"QPSK 1/2, without rate.adapt; {_LISTED}"
     else:
         told = f"QPSK 1/2; {_LISTED}"
     lines.append(_line(f"mcs = {SLOWEST_MCS}", told))
