@@ -11,6 +11,9 @@ from tests.programs import sdrlinkctl
 DRIVEN = "/robot_1/cmd_*"
 """What the bridge lets people at Foxglove send."""
 
+SETTINGS = 'registry = ""\ntopic.cmd_vel.lifespan_s = inf\n'
+"""A command would be too old after 0.3 s, which a busy machine needs to draw breath."""
+
 
 def bridge_to(daemon, *arguments):
     """A bridge beside a daemon, not started yet."""
@@ -42,7 +45,7 @@ def team(tmp_path_factory):
     with contextlib.ExitStack() as stack:
         start = stack.enter_context(daemons(tmp_path_factory))
         hub = tmp_path_factory.mktemp("hub")
-        robots = stack.enter_context(pair(start, hub, 'registry = ""\n'))
+        robots = stack.enter_context(pair(start, hub, SETTINGS))
         bridge = stack.enter_context(bridge_to(robots[1], "--publish", DRIVEN))
         yield Team(robots, url_of(bridge))
         assert "Traceback" not in bridge.log(), bridge.log()

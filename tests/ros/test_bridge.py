@@ -125,9 +125,9 @@ def run_team(start_daemon, start, hub):
 
 @pytest.mark.long
 def test_commands_go_one_way_though_the_robots_own_planner_uses_the_name(start_daemon, start, hub):
-    policy = "[topic.cmd_vel]\ndeadman_s = 1.0\nlifespan_s = 0.5\n"
-    one = Robot(start, start_daemon(config(hub, 1))).bridged().watched()
-    two = Robot(start, start_daemon(config(hub, 2, policy))).bridged().watched()
+    each = "[topic.cmd_vel]\ndepth = 0\nlifespan_s = inf\n"
+    one = Robot(start, start_daemon(config(hub, 1, each))).bridged().watched()
+    two = Robot(start, start_daemon(config(hub, 2, each + "deadman_s = 1.0\n"))).bridged().watched()
     # Like Nav2, the robot publishes and hears its own commands.
     two.node.pub(topic="/cmd_vel", type=TWIST)
     two.node.sub(topic="/cmd_vel", type=TWIST)
