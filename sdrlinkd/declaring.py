@@ -47,7 +47,7 @@ class Declaring:
         self._transforms = transforms
         self._said, self._said_at = "", -inf
 
-    def declare(self, arguments: dict[str, Any]) -> dict[str, Any]:
+    def declare(self, now: float, arguments: dict[str, Any]) -> dict[str, Any]:
         """Take a topic, and return what became of it. Raises DeclarationError."""
         try:
             declaration = msgspec.convert(arguments, Declaration)
@@ -61,7 +61,7 @@ class Declaring:
                 f"{name}: got type {declaration.type[:128]}; allowed for topics in tf.topics: "
                 f"{TF_TYPE}"
             )
-        topic = self._link.declare(declaration.offer(name))
+        topic = self._link.declare(declaration.offer(name), now)
         if is_filtered and topic.id not in self._transforms:
             # This imports the message types, which are slow to load.
             from sdrlinkd.adapters import Transforms

@@ -82,7 +82,10 @@ def make_verbs(
             lambda _: {"problems": node.audit(), "ledger": node.snapshot(control.requests).link},
             "verify that the ledger adds up",
         ),
-        "declare": Verb(declaring.declare, "take a topic from now on, with its type and QoS"),
+        "declare": Verb(
+            lambda arguments: declaring.declare(opening.pdu_link.now(), arguments),
+            "take a topic from now on, with its type and QoS",
+        ),
         "declared": Verb(lambda _: declaring.declared(), "topics that other robots declared"),
         "demand": Verb(
             lambda arguments: declaring.demand(opening.pdu_link.now(), arguments),

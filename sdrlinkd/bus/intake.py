@@ -68,8 +68,8 @@ class Intake:
         self._last_bad: Callable[[], str] = str
 
     def accept(self, name: str, topic: Topic) -> bool:
-        """Accept messages under bus topic `name`; False if they were accepted before."""
-        is_new = name not in self.topics
+        """Accept messages under bus topic `name`; False if they were accepted before as these."""
+        is_new = self.topics.get(name) != topic
         self.topics[name] = topic
         self._topic_ids[name.encode() + b"\0"] = topic.id
         self.names[topic.id] = name

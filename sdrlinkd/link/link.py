@@ -379,13 +379,18 @@ class Link:
 
     # Topics.
 
-    def declare(self, offer: Offer) -> Topic:
+    def declare(self, offer: Offer, now: float = 0.0) -> Topic:
         """The topic of a producer's offer, from which messages are taken from now on.
 
-        Raises DeclarationError.
+        It replaces one that contradicts it and is idle. Raises DeclarationError.
         """
-        topic = self._topics.declare(offer)
-        self._intake.add(topic.id)
+        intake = self._intake
+        known = self._topics.by_name(offer.name)
+        topic = self._topics.declare(offer, lambda topic_id: intake.is_idle(topic_id, now))
+        if known is not None and known.id != topic.id:
+            self._latched.forget(known.id)
+        intake.add(topic.id)
+        intake.used(topic.id, now)
         self._scheduler.more_to_send()
         return topic
 

@@ -137,14 +137,16 @@ def test_the_time_of_answers_sets_when_to_ask_again():
     source = Source()
     assert source.again_s == 0.04
     for asks, took_s, again_s in (
-        (1, 0.02, 0.04), (1, 0.1, 0.08), (2, 9.0, 0.08), (1, 0.0, 0.06), (1, 9.0, 0.3),
+        (1, 0.02, 0.04), (1, 0.1, 0.08), (2, 0.2, 0.1), (1, 0.0, 0.075), (1, 9.0, 0.3),
     ):  # fmt: skip
-        missing = Missing(1, 0.0, 0.0, frozenset(), asks=asks, asked_at=1.0)
+        missing = Missing(1, 0.0, 0.0, frozenset(), asks=asks, first_asked_at=1.0)
         source.filled(missing, 1.0 + took_s)
         assert source.again_s == pytest.approx(again_s)
     for _ in range(30):
         source.filled(missing, 1.0)
     assert source.again_s == 0.02
+    source.filled(Missing(1, 0.0, 0.0, frozenset()), 2.0)
+    assert source.again_s == 0.02, "nobody asked for it"
     asking = lacking(10)
     asked(asking, 0.005)
     asking.asked(0.005, (), 0.0)
@@ -153,6 +155,26 @@ def test_the_time_of_answers_sets_when_to_ask_again():
     asked(asking, 0.21)
     asking.asked(0.21, (), 0.0)
     assert asking.due_at == pytest.approx(0.21 + 2 * (0.02 + 0.25 * 0.08))
+
+
+@pytest.mark.parametrize("answer_s", [0.005, 0.03, 0.08, 0.14])
+def test_answers_become_slower_and_faster_and_are_asked_for_once_again(answer_s):
+    """Where an answer takes longer than before, a second question is soon in vain no more."""
+
+    def n_asks(source):
+        missing = Missing(1, 0.0, 0.0, frozenset())
+        at = 0.0
+        while at < answer_s and missing.asks_left:
+            source.asked(missing, at)
+            at = missing.next_at
+        source.filled(missing, answer_s)
+        return missing.asks
+
+    for before_s in (0.0, 0.02, 0.15, 1.0):
+        source = Source(answer_s=before_s)
+        asks = [n_asks(source) for _ in range(40)]
+        assert set(asks[20:]) == {1}
+        assert source.again_s < 4 * max(answer_s, 0.01)
 
 
 def test_where_there_was_no_room_nothing_counts_as_asked():
@@ -275,6 +297,16 @@ def test_while_parity_may_still_come_nothing_is_asked(topic_id, with_parity):
     assert asked(asking, 0.055) == [10], "the message is over"
 
 
+def test_a_topic_that_has_no_parity_any_more_is_asked_for_at_once():
+    asking = make(held=[(9, 0, 1)])
+    asking.placed(placed(8, (), Parity(0, 7, 9, 1, 0, 0, 2, 18, b"x")))
+    for at, waits in ((9.9, True), (10.2, False)):
+        asking.placed(placed(9, entries=(fragment(0),), at=at))
+        asking.placed(placed(11, (10,), entries=(fragment(2),), at=at))
+        assert asked(asking, at + 0.006) == ([] if waits else [10])
+        asking.placed(placed(10, entries=(fragment(1),), at=at + 0.01))
+
+
 def test_where_relays_send_less_urgent_ones_later_one_waits_longer():
     def forwarded(number, skipped=(), at=0.0, qos=Qos.DEFAULT, **more):
         return placed(number, skipped, at=at, qos=qos, is_forwarded=True, **more)
@@ -332,8 +364,13 @@ def test_a_source_that_relays_bring_is_asked_if_it_is_useful():
     assert (source.is_asked, source.patience_s) == (False, 0.2)
     source.came(placed(2), is_useful=True)
     assert (source.is_asked, source.useful, source.hears_relays) == (True, 0.02, True)
-    source.came(placed(3), is_useful=False)
+    source.came(placed(3, at=1.99), is_useful=False)
     assert source.useful == pytest.approx(0.02 * 0.98)
+    assert source.patience_s == 0.2
+    source.came(placed(4, at=2.0), is_useful=False)
+    assert (source.hears_relays, source.patience_s) == (False, 0.005), "it has come near"
+    source.came(placed(5, at=2.1, is_forwarded=True), is_useful=False)
+    assert source.hears_relays
     relayed, own = (Missing(1, 0.0, 0.0, frozenset(), is_relayed=each) for each in (True, False))
     assert (relayed.asks_left, own.asks_left) == (6, 3)
     asking = make()

@@ -158,6 +158,17 @@ def test_a_number_that_no_source_could_have_reached_is_not_believed():
     assert (track.lost, track.newest) == (0, 101)
 
 
+@pytest.mark.parametrize("ahead", [20_300, 25_000, 99_000, -25_000])
+def test_after_a_false_number_the_second_true_one_is_believed(ahead):
+    track = SequenceTrack()
+    numbered(track, 0, 100, at=0.0, every_s=0.01, told=(0,))
+    track.heard(200, 1, 5.0, told=100 + ahead & ~0xFF | 200)
+    numbered(track, 201, 20, at=5.1, every_s=0.01, told=(210, 220))
+    assert track.newest == 220
+    numbered(track, 221, 20, at=5.4, every_s=0.01, told=range(221, 240))
+    assert (track.newest, track.number, track.is_numbered) == (240, 240, True)
+
+
 def test_numbers_wrap_around():
     track = SequenceTrack()
     for i in range(200):

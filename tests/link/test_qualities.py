@@ -45,6 +45,8 @@ def test_what_came_through_a_relay_only_was_lost_on_the_link():
     air.hears |= {(1, 2)}
     flow(air, 2, 0.7)
     assert share(air, 1, of=2) < 0.7
+    flow(air, 2, 5.0)
+    assert share(air, 1, of=2) > 0.8
 
 
 @pytest.mark.slow

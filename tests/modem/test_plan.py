@@ -30,6 +30,17 @@ def test_the_next_burst_is_composed_ahead_without_a_pause_on_the_air():
     assert plan.start(now=free - 150) == plan.start(now=free - 100) == free
 
 
+@given(st.integers(0, 500), st.integers(0, 500), st.integers(1, 100))
+def test_a_lead_that_grew_by_late_bursts_comes_back(lead, ahead, n_late):
+    plan = AirPlan(lead, ahead)
+    for _ in range(n_late):
+        plan.was_late()
+    assert lead <= plan.start(now=0) <= lead + ahead
+    for _ in range(500):
+        plan.was_in_time()
+    assert plan.start(now=0) == lead
+
+
 @given(st.integers(0, 500), st.lists(st.tuples(st.integers(1, 3000), st.integers(0, 3000))))
 def test_bursts_follow_each_other_and_never_more_than_one_is_ahead(lead, bursts):
     plan, now, end = AirPlan(lead), 0, 0

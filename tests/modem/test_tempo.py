@@ -22,5 +22,17 @@ def test_the_machine_is_learned_and_who_holds_it_up_now_and_then_is_not(
     assert 0.7 < n * per_sample_s / 0.01 < 1.15, f"seed {seed}"
 
 
+@pytest.mark.parametrize("slower", [1 / 50, 3, 50])
+def test_a_machine_that_was_busy_or_idle_for_an_hour_is_known_again(slower):
+    tempo = Tempo()
+    for _ in range(40_000):
+        tempo.note(10_000, slower * 1e-3)
+    n, limit = 0, 250
+    while not 0.7e-3 < tempo.seconds(10_000) < 1.5e-3 and n < limit:
+        tempo.note(10_000, 1e-3)
+        n += 1
+    assert n < limit
+
+
 def test_where_there_is_no_time_there_are_no_samples():
     assert Tempo().samples_in(OVERHEAD_S / 2) == 0

@@ -19,7 +19,7 @@ from sdrlinkd.link.queue.parting import Parting
 from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.queue.topic_state import TopicState
 from sdrlinkd.link.schedule import ClassesParams
-from sdrlinkd.link.topics import OwnTopics
+from sdrlinkd.link.topics import IDLE_S, OwnTopics
 from sdrlinkd.reports import RelayReport, TopicReport
 from sdrlinkd.wire import (
     FIRST_NUMBER,
@@ -81,6 +81,14 @@ class Intake:
                 self._dst, self._has_control, dictionary, self._first_large
             )
 
+    def used(self, topic_id: int, now: float) -> None:
+        """Note that somebody uses a topic: a producer that has declared it."""
+        self._topics[topic_id].used_at = now
+
+    def is_idle(self, topic_id: int, now: float) -> bool:
+        """Whether nobody has declared a topic or sent a message of it for IDLE_S."""
+        return now - self._topics[topic_id].used_at >= IDLE_S
+
     def keyed(self, topic_id: int, payload: bytes, wishes: Overrides) -> Overrides:
         """`wishes` with a producer key for a latched message, if the topic's policy makes one."""
         policy = self._topics[topic_id].policy
@@ -104,6 +112,7 @@ class Intake:
         `is_admitted`: the team has air for it.
         """
         topic = self._topics[topic_id]
+        topic.used_at = now
         topic.tally.accept(len(payload))
         refused = topic.admission.refuse(payload, now) if is_admitted else "tx_not_admitted"
         if refused:
@@ -153,6 +162,7 @@ class Intake:
         """Forget the arrival times of messages, as another clock starts."""
         for topic in self._topics.values():
             topic.apply(topic.policy, topic.command)
+            topic.used_at = -inf
 
     def tally(self, topic_id: int) -> TxTally:
         """The message counters of one topic."""

@@ -1,5 +1,7 @@
 """The sender's state of a topic: its policy, resolved once, and its counters."""
 
+from math import inf
+
 import zstandard
 
 from sdrlinkd.link.qos import QOS_BY_LABEL, Qos
@@ -15,7 +17,7 @@ class TopicState:
 
     __slots__ = (
         "_default_dst", "_dictionary", "_has_control", "_n_large", "admission", "command",
-        "deflated", "dst", "needed_bytes_per_s", "origin", "policy", "tally",
+        "deflated", "dst", "needed_bytes_per_s", "origin", "policy", "tally", "used_at",
     )  # fmt: skip
 
     def __init__(
@@ -32,6 +34,8 @@ class TopicState:
         self.tally = TxTally()
         self.origin = ""
         self.needed_bytes_per_s = 0.0
+        self.used_at = -inf
+        """When a producer declared the topic, or sent a message of it, for the last time."""
         self.apply(TopicPolicy())
 
     def count_large(self) -> int:

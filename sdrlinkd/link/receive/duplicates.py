@@ -35,8 +35,9 @@ class SequenceTrack:
     """
 
     __slots__ = (
-        "_anchor", "_doubtful", "_heard", "_leap", "_newest_at", "_order", "_reached", "_seen",
-        "_settled", "_told_at", "fills", "is_numbered", "newest", "number", "restarts", "skipped",
+        "_anchor", "_doubted", "_doubtful", "_heard", "_leap", "_newest_at", "_order", "_reached",
+        "_seen", "_settled", "_told_at", "fills", "is_numbered", "newest", "number", "restarts",
+        "skipped",
     )  # fmt: skip
 
     def __init__(self) -> None:
@@ -65,6 +66,8 @@ class SequenceTrack:
         self._doubtful = 0
         # The most losses that one step has shown since the source's boot id was last confirmed.
         self._leap = 0
+        # What the last told number that was not believed would add to all numbers.
+        self._doubted: int | None = None
         # The highest number that a relay has sent, by class.
         self._reached: dict[Qos, int] = {}
 
@@ -203,7 +206,8 @@ class SequenceTrack:
     def _aligned(self, number: int, told: int, at: float) -> int:
         """The number of a PDU, which is `number` by its sequence number and `told` by its source.
 
-        One that no source could have reached since its last PDU is not believed.
+        One that no source could have reached since its last PDU is not believed, unless the next
+        one that is told agrees with it. Then what was believed before was false.
         """
         if not self.is_numbered:
             self._shift(nearest_number(told, number & 0xFF) - number)
@@ -215,7 +219,13 @@ class SequenceTrack:
         off = (told - self.newest + PDU_NUMBERS // 2) % PDU_NUMBERS - PDU_NUMBERS // 2
         believed = self.newest + off
         if not -MOST_PER_S * KEEP_S < off <= 256 + MOST_PER_S * (at - self._told_at):
-            return number
+            before, self._doubted = self._doubted, believed - number
+            if before != self._doubted:
+                return number
+            self._shift(before)
+            self._told_at = at
+            return believed
+        self._doubted = None
         if off >= 0:
             self._told_at = at
         return believed

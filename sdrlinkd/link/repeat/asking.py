@@ -67,7 +67,7 @@ class Asking:
             self._look_ahead()
         for record in event.read.records:
             if isinstance(record, Parity):
-                source.has_parity.add(record.topic_id)
+                source.parity_at[record.topic_id] = event.at
         before = source.last
         if before is not None and event.number < before.number:
             return
@@ -207,7 +207,7 @@ class Asking:
             return False
         running = parts(source.last)
         awaits_parity = any(
-            message in running and (message[0] == PARTS or message[0] in source.has_parity)
+            message in running and (message[0] == PARTS or source.has_parity(message[0]))
             for message in missing.inside
         )
         if awaits_parity:

@@ -20,10 +20,15 @@ ASKS, RELAYED_ASKS = 3, 6
 FIRST_AGAIN_S = 0.04
 LEAST_AGAIN_S, MOST_AGAIN_S = 0.02, 0.3
 """Limits of the time in s after which a PDU is asked for again."""
-WEIGHT = 0.25
-"""Weight of the newest answer in the mean time of answers."""
+WEIGHT, UNSURE_WEIGHT = 0.25, 0.0625
+"""Weight of the newest answer in the mean time of answers: to the only question about its PDU, and
+to one of several, of which it may be the first or the last."""
 USEFUL, USEFUL_WEIGHT = 0.05, 0.02
 """Share of PDUs with messages for us from which a question gets a PDU of its own."""
+RELAYED_S = 2.0
+"""Time in s after its last PDU over a relay for which others of a source may come over one."""
+PARITY_S = 10.0
+"""Time in s after the last parity of a topic for which its messages are taken to have some."""
 HARDLY = 1e-4
 """Share of PDUs with messages for us below which a source that relays bring is not asked."""
 
@@ -45,6 +50,7 @@ class Missing:
     others_asked: bool = False
     """Whether another robot has asked for it."""
     asked_at: float = -inf
+    first_asked_at: float = -inf
 
     @property
     def asks_left(self) -> int:
@@ -58,15 +64,16 @@ class Source:
 
     missing: dict[int, Missing] = field(default_factory=dict)
     last: PduPlaced | None = None
-    has_parity: set[int] = field(default_factory=set)
-    """Topics whose messages have parity."""
+    parity_at: dict[int, float] = field(default_factory=dict)
+    """When the last parity came, by topic."""
     useful: float = 0.0
     """Share of its recent PDUs with messages for us."""
     answer_s: float = FIRST_AGAIN_S / 2
     """Mean time from a question to its answer."""
-    hears_relays: bool = False
     heard_at: float = -inf
     """When its last new PDU came."""
+    relayed_at: float = -inf
+    """When its last new PDU came over a relay."""
     _reached: dict[Qos, tuple[int, float]] = field(default_factory=dict)
     """(highest number that came, when) by class, as the header tells it."""
 
@@ -74,6 +81,11 @@ class Source:
     def again_s(self) -> float:
         """Time in s after which a PDU is asked for again."""
         return min(max(2 * self.answer_s, LEAST_AGAIN_S), MOST_AGAIN_S)
+
+    @property
+    def hears_relays(self) -> bool:
+        """Whether its PDUs come over relays."""
+        return self.heard_at < self.relayed_at + RELAYED_S
 
     @property
     def patience_s(self) -> float:
@@ -98,7 +110,8 @@ class Source:
         at, pdu = event.at, event.read.pdu
         self.heard_at = at
         self.useful += USEFUL_WEIGHT * (is_useful - self.useful)
-        self.hears_relays = self.hears_relays or event.read.is_forwarded
+        if event.read.is_forwarded:
+            self.relayed_at = at
         if event.read.control.n_entries == len(pdu.entries):
             return False
         reached, _ = self._reached.get(CLASSES[pdu.qos], (event.number, at))
@@ -113,6 +126,8 @@ class Source:
 
     def asked(self, missing: Missing, at: float) -> None:
         """Note that a PDU was asked for at `at`."""
+        if not missing.asks:
+            missing.first_asked_at = at
         missing.asks += 1
         missing.asked_at = at
         again_s = self.again_s * (missing.asks if missing.is_relayed else 1)
@@ -120,6 +135,15 @@ class Source:
         missing.next_at = at + again_s if missing.asks_left > 0 else inf
 
     def filled(self, missing: Missing, at: float) -> None:
-        """Note that a PDU came that was missing."""
-        if missing.asks == 1:
-            self.answer_s += WEIGHT * (at - missing.asked_at - self.answer_s)
+        """Note that a PDU came that was missing.
+
+        It always counts from the first question. Otherwise answers that take longer than the mean
+        promises, so that a second question is asked meanwhile, would never be learned.
+        """
+        if missing.asks:
+            weight = WEIGHT if missing.asks == 1 else UNSURE_WEIGHT
+            self.answer_s += weight * (at - missing.first_asked_at - self.answer_s)
+
+    def has_parity(self, topic_id: int) -> bool:
+        """Whether messages of a topic have parity."""
+        return self.heard_at < self.parity_at.get(topic_id, -inf) + PARITY_S

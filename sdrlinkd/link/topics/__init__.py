@@ -6,11 +6,12 @@ decides when both are told to other robots. It never sees a message.
 
 from sdrlinkd.link.topics.demand import LEASE_S, Demand
 from sdrlinkd.link.topics.heard import HeardTopic, HeardTopics
-from sdrlinkd.link.topics.own import MOST_KEYS, N_NUMBERS, Offer, OwnTopics
+from sdrlinkd.link.topics.own import IDLE_S, MOST_KEYS, N_NUMBERS, Offer, OwnTopics
 from sdrlinkd.link.topics.telling import TELLING_SHARE, TopicTeller
 from sdrlinkd.link.topics.wants import Wants
 
 __all__ = [
+    "IDLE_S",
     "LEASE_S",
     "MOST_KEYS",
     "N_NUMBERS",

@@ -110,12 +110,16 @@ class HeardTopics:
             return False
         try:
             about = parse_description(b"".join(there[i] for i in range(n)), check)
-            self._check(source, about)
+            _check(source, about)
         except PduError as error:
             self.refused.setdefault(src, {})[number] = error.detail
             return False
         finally:
             there.clear()
+        for other, topic in list(source.known.items()):
+            if topic.name == about.name and _kind(topic.about) != _kind(about):
+                # Its newest word counts: the producer has begun anew with another type.
+                self._forget_number(src, source, other)
         same = (topic.base for topic in source.known.values() if topic.name == about.name)
         base = next(same, number)
         self.refused.get(src, {}).pop(number, None)
@@ -127,6 +131,7 @@ class HeardTopics:
         """Forget what a robot declared, as it has restarted."""
         source = self._sources.pop(src, None)
         self.refused.pop(src, None)
+        self._not_understood.discard(src)
         if source is not None:
             self.version += 1
             self.changed += [(src, number) for number in source.known]
@@ -182,19 +187,20 @@ class HeardTopics:
         kind = topic.type if registered is None else registered.type
         return f"{kind} with hash {self._own_hash(kind).hex()}"
 
-    def _check(self, source: _Source, about: Description) -> None:
-        """Raise PduError if a description contradicts what its source declared before."""
-        for topic in source.known.values():
-            if topic.name == about.name:
-                if topic.type != about.type:
-                    raise PduError(
-                        "rx_control_bad", f"{about.name} is both {topic.type} and {about.type}"
-                    )
-            elif topic.name.lower() == about.name.lower():
-                raise PduError(
-                    "rx_control_bad",
-                    f"{about.name} differs from {topic.name} by upper and lower case only",
-                )
+
+def _check(source: _Source, about: Description) -> None:
+    """Raise PduError if a name differs from another one of its source by case only."""
+    for topic in source.known.values():
+        if topic.name != about.name and topic.name.lower() == about.name.lower():
+            raise PduError(
+                "rx_control_bad",
+                f"{about.name} differs from {topic.name} by upper and lower case only",
+            )
+
+
+def _kind(about: Description | None) -> tuple[str, bytes] | None:
+    """What all numbers of a topic have in common."""
+    return None if about is None else (about.type, about.hash_)
 
 
 def _hash(topic: HeardTopic) -> str:

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from sdrlinkd.errors import DeclarationError
@@ -22,6 +22,8 @@ from sdrlinkd.wire import (
 
 MOST_KEYS = 32
 """Most numbers of a topic: one for each producer key."""
+IDLE_S = 5.0
+"""Time in s without a message or a declaration after which a topic's producers have ended."""
 N_NUMBERS = LAST_NUMBER - FIRST_NUMBER + 1
 
 
@@ -78,10 +80,12 @@ class OwnTopics:
         """The known hash of a type, by its producers here; zeros if unknown."""
         return self._hashes.get(type_, bytes(HASH_SIZE))
 
-    def declare(self, offer: Offer) -> Topic:
+    def declare(self, offer: Offer, is_idle: Callable[[int], bool] = lambda _: False) -> Topic:
         """The topic of an offer: one of the registry, a known one, or a new one.
 
-        Raises DeclarationError.
+        A declaration with another type, or another hash of it, replaces the earlier one of its
+        name if `is_idle(topic id)`: the producer has ended, or has begun anew. The new topic has
+        another number, so no message is taken for one of the other type. Raises DeclarationError.
         """
         type_ = topic_type(offer.type)
         if not is_topic_name(read_origin(offer.name).name) or len(offer.name) > MAX_NAME:
@@ -94,14 +98,20 @@ class OwnTopics:
                 f"type: got {offer.type[:MAX_NAME]!r}; allowed: package/msg/Name or package/Name"
             )
         name = offer.name.removeprefix("/")
-        self._note_hash(name, type_, offer.hash_)
+        about = Description(name, type_, *offer[2:])
+        self._note_hash(name, type_, offer.hash_, is_idle)
         known = self._by_name.get(name)
         if known is None:
-            return self._new(name, type_, offer)
-        if known.type != type_:
-            raise DeclarationError(f"{name}: got type {type_}; it is declared as {known.type}")
-        if known.id >= FIRST_NUMBER:
-            self._tell(known.id, Description(name, type_, *offer[2:]))
+            return self._new(about)
+        told = self.told.get(known.id)
+        if known.type != type_ and (told is None or not is_idle(known.id)):
+            how = "" if told is None else f" and in use; end that, and try again after {IDLE_S:g} s"
+            raise DeclarationError(f"{name}: got type {type_}; it is declared as {known.type}{how}")
+        if told is None:
+            return known
+        if known.type != type_ or _is_other(told.hash_, about.hash_):
+            return self._replaced(known, about)
+        self._tell(known.id, about)
         return known
 
     def set_depth(self, topic_id: int, depth: int) -> None:
@@ -123,35 +133,45 @@ class OwnTopics:
 
     def _number_for(self, topic_id: int, key: str) -> int:
         keys = self._keys[topic_id]
-        if not keys:
-            number = topic_id
-        elif len(keys) >= MOST_KEYS or len(self.told) >= N_NUMBERS:
+        number: int | None = topic_id
+        if keys:
+            is_full = len(keys) >= MOST_KEYS
+            number = None if is_full else self._free(f"{self._by_id[topic_id].name}\0{key}")
+        if number is None:
             # The producer that was silent for longest gives its number to the new one.
             _, number = keys.popitem(last=False)
-        else:
-            number = self._free(f"{self._by_id[topic_id].name}\0{key}")
-            self._note(number, self.told[topic_id])
+        self._note(number, self.told[topic_id])
         keys[key] = number
         return number
 
-    def _new(self, name: str, type_: str, offer: Offer) -> Topic:
+    def _replaced(self, known: Topic, about: Description) -> Topic:
+        """A topic in place of one that nobody uses; messages of that one may still wait."""
+        topic = self._new(about)
+        for number in {known.id, *self._keys.pop(known.id).values()}:
+            del self.told[number]
+        self.version += 1
+        return topic
+
+    def _new(self, about: Description) -> Topic:
+        name = about.name
         if not self.has_numbers:
             raise DeclarationError(
                 f"{name}: {self.registry.suggest(name)}; with `auto = true` producers may declare "
                 "topics beyond it"
             )
-        if (alike := self._by_lower.get(name.lower())) is not None:
+        alike = self._by_lower.get(name.lower(), name)
+        if alike != name:
             raise DeclarationError(f"{name}: differs from {alike} by upper and lower case only")
-        if len(self.told) >= N_NUMBERS:
+        number = self._free(name)
+        if number is None:
             raise DeclarationError(f"{name}: a robot declares at most {N_NUMBERS} topics")
-        about = Description(name, type_, *offer[2:])
         try:
             pieces(FIRST_NUMBER, about, self._room)
         except ValueError as error:
             raise DeclarationError(
                 f"{error} do not fit into 15 PDUs; use a shorter name, or raise link.pdu_size"
             ) from None
-        topic = Topic(self._free(name), name, type_)
+        topic = Topic(number, name, about.type)
         self._by_id[topic.id] = self._by_name[name] = topic
         self._by_lower[name.lower()] = name
         self._keys[topic.id] = OrderedDict()
@@ -168,18 +188,27 @@ class OwnTopics:
             self.told[number] = about
             self.version += 1
 
-    def _free(self, text: str) -> int:
-        """A free number, the same one for the same text as far as possible."""
+    def _free(self, text: str) -> int | None:
+        """A free number, the same one for the same text as far as possible; None: there is none."""
         first = int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "big")
         tried = (FIRST_NUMBER + (first + i) % N_NUMBERS for i in range(N_NUMBERS))
-        return next(number for number in tried if number not in self.told)
+        taken = self.told.keys() | self._by_id.keys()
+        return next((number for number in tried if number not in taken), None)
 
-    def _note_hash(self, name: str, type_: str, hash_: bytes) -> None:
-        if not any(hash_):
-            return
-        known = self._hashes.setdefault(type_, hash_)
-        if known != hash_:
+    def _note_hash(
+        self, name: str, type_: str, hash_: bytes, is_idle: Callable[[int], bool]
+    ) -> None:
+        known = self.hash_of(type_)
+        used = any(not is_idle(each.id) for each in self if each.type == type_)
+        if _is_other(known, hash_) and used:
             raise DeclarationError(
                 f"{name}: {type_} has hash {hash_.hex()}, but another producer here has "
                 f"{known.hex()}: two versions of its package are installed"
             )
+        if any(hash_):
+            self._hashes[type_] = hash_
+
+
+def _is_other(known: bytes, hash_: bytes) -> bool:
+    """Whether two hashes differ, as far as both are known."""
+    return any(known) and any(hash_) and known != hash_

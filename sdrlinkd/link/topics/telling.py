@@ -43,6 +43,8 @@ class TopicTeller:
         """The records to be told at `now`."""
         if self._version != self.topics.version:
             self._version = self.topics.version
+            for number in self._due_at.keys() - self.topics.told.keys():
+                del self._due_at[number], self._said[number]
             for number, about in self.topics.told.items():
                 if self._said.get(number) != about:
                     self._said[number] = about
