@@ -44,7 +44,7 @@ ROWS = {
         "400kB_best_effort", "1500kB_reliable",
         *(f"alone_{size}_pct" for size in ("50kB", "400kB", "800kB", "1500kB")),
         *(
-            f"{each}_{air}" for air in ("1ch", "full_duplex", "1ch_adaptive")
+            f"{each}_{air}" for air in ("1ch", "1ch_both", "full_duplex", "1ch_adaptive")
             for each in ("laser", "laser_std", "laser_p99", "image", "image_pct")
         ),
         *(
@@ -54,6 +54,13 @@ ROWS = {
         *(f"outage_first_{topic}_s" for topic in ("odom", "scan", "cmd_vel")), "outage_oldest_s",
         "latched_depth_5", "50_reliable_at_once", "two_best_effort",
         "fair_wait_over_bound", "fair_bounds_broken",
+        *(
+            f"{where}nav2_{each}" for where in ("", "daemons_")
+            for each in (
+                "odom_pct", "tf_pct", "joints_pct", "scan_pct", "camera_pct", "costmap_pct",
+                "p99_ms", "states_p99_ms",
+            )
+        ),
         *(f"daemons_odom_beside_200kB_{each}" for each in ("pct", "p50_ms", "p99_ms")),
         "daemons_400kB_best_effort", "daemons_image_ms", "daemons_image_pct",
         *(f"daemons_laser_{each}" for each in ("ms", "std_ms", "p99_ms", "pct")),

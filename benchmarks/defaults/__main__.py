@@ -4,15 +4,16 @@ import argparse
 import json
 import sys
 from collections.abc import Collection, Iterator, Sequence
+from math import inf
 from pathlib import Path
 from random import Random
 from statistics import pstdev
 from typing import Literal
 
 from backends import Outage
-from benchmarks.defaults.daemons import RATE, drive_daemons
+from benchmarks.defaults.daemons import RATE, Ages, drive_daemons
 from benchmarks.defaults.fairness import fairness_rows
-from benchmarks.defaults.team import LISTENER, Air, Drive, Flow, drive
+from benchmarks.defaults.team import LISTENER, SENDER, Air, Drive, Flow, drive
 from benchmarks.report import Row, main
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.wire import equal_payload
@@ -34,12 +35,27 @@ LARGE: tuple[tuple[int, Literal["reliable", "best_effort"]], ...] = (
 LARGE_HZ = 0.35
 HALF_DUPLEX = Air(is_half_duplex=True)
 SEED_AIRS = {
-    "1ch": HALF_DUPLEX, "full_duplex": Air(), "1ch_adaptive": Air(None, is_half_duplex=True),
+    "1ch": HALF_DUPLEX, "1ch_both": HALF_DUPLEX, "full_duplex": Air(),
+    "1ch_adaptive": Air(None, is_half_duplex=True),
 }  # fmt: skip
 LONG_S = 20.0
 DAEMONS_MCS = 6
 """64QAM 3/4, which carries as much at 2 Msps as 16QAM 1/2 at 5 Msps."""
 DAEMONS_TOLD = f"as init writes it; overridden: {RATE}, MCS {DAEMONS_MCS}, fixed"
+NAV2 = (
+    ("odom", ODOM, ODOM_SIZE, ODOM_HZ, 99.5),
+    ("tf", "tf2_msgs/msg/TFMessage", 250, 30.0, 99.5),
+    ("joints", "sensor_msgs/msg/JointState", 400, 20.0, 99.5),
+    ("scan", SCAN, 2900, 10.0, 99.5),
+    ("camera", "sensor_msgs/msg/CompressedImage", 15_000, 5.0, 99.5),
+    ("costmap", "nav_msgs/msg/OccupancyGrid", 3700, 2.0, None),
+)
+"""Topic, type, bytes and messages per s of a robot that navigates, 1.2 Mbit/s in all; and the
+target of those that arrive, in %."""
+NAV2_STATES = ("odom", "tf", "joints", "scan")
+NAV2_ROBOTS, NAV2_P99_MS, NAV2_BEGIN_S = 3, 150.0, 4.0
+PACED = Air(None, is_half_duplex=True, react_s=3e-3, rate=RATE)
+"""The air of whole daemons: a radio in real time reacts within 3 ms."""
 LEAST_BIT_S = 1.2e6
 """Rate at which one message of such a topic is to arrive within the drive."""
 LATE_S = 1.0
@@ -71,6 +87,10 @@ def _rows(seed: int, duration_s: float) -> Iterator[Row]:
     yield from _pauses(seed, 10 if duration_s < LONG_S else 100)
     yield from _outage(seed)
     yield from _depths(seed)
+    flows = _nav2_flows(duration_s, seed)
+    until_s = NAV2_BEGIN_S + duration_s
+    found = drive(flows, until_s, seed, PACED)
+    yield from _nav2("nav2", flows, found.ages_s, until_s, f"reacts in 3 ms; {_told(found)}")
     yield from fairness_rows(seed, 30 if duration_s < LONG_S else 300)
 
 
@@ -92,6 +112,10 @@ def _whole(duration_s: float) -> Iterator[Row]:
     times = [BEGIN_S + i / LARGE_HZ for i in range(4)]
     ages = drive_daemons([Flow("big", CLOUD, size, times, offer)], DAEMONS_MCS, 5.0)
     yield Row(f"daemons_{_sized(size)}_{offer}", len(ages["big"]), "of 4", 4, "more", 4, note=note)
+    flows = _nav2_flows(duration_s, 5)
+    note = f"{NAV2_ROBOTS} daemons and a hub, as init writes it; overridden: {RATE}"
+    yield from _nav2("daemons_nav2", flows, drive_daemons(flows, None), inf, note)
+    note = f"two daemons and a hub, {DAEMONS_TOLD}"
     laser = Flow("scan", SCAN, LASER_SIZE, _times(LASER_HZ, duration_s, Random(3)))
     image = Flow("image", IMAGE, PICTURE_SIZE, _times(1 / PICTURE_S, duration_s, Random(4)))
     ages = drive_daemons([laser, image], DAEMONS_MCS)
@@ -148,16 +172,22 @@ def _alone(seed: int) -> Iterator[Row]:
 
 
 def _seed_workload(seed: int, duration_s: float) -> Iterator[Row]:
-    """Pound's laser and image between two robots."""
+    """Pound's laser and image from one of two robots to the other, or from both."""
     for name, air in SEED_AIRS.items():
-        laser = Flow("scan", SCAN, LASER_SIZE, _times(LASER_HZ, duration_s, Random(seed)))
-        image = Flow("image", IMAGE, PICTURE_SIZE, _times(1 / PICTURE_S, duration_s, Random(seed)))
+        laser, image, *others = [
+            Flow(f"{topic}_{robot}", kind, size, _times(hz, duration_s, Random(seed)), sender=robot)
+            for robot in ((SENDER, LISTENER) if name == "1ch_both" else (SENDER,))
+            for topic, kind, size, hz in (
+                ("scan", SCAN, LASER_SIZE, LASER_HZ),
+                ("image", IMAGE, PICTURE_SIZE, 1 / PICTURE_S),
+            )
+        ]
         until_s = BEGIN_S + duration_s
-        found = drive([laser, image], until_s, seed, air)
-        lasers_s, images_s = found.ages_s["scan"], found.ages_s["image"]
+        found = drive([laser, image, *others], until_s, seed, air)
+        lasers_s, images_s = found.ages_s[laser.name], found.ages_s[image.name]
         due = [i for i, at in enumerate(image.times) if at < until_s - LATE_S]
         arrived = 100 * sum(i in images_s for i in due) / len(due)
-        has_target = air == HALF_DUPLEX
+        has_target = name == "1ch"
         for row, value, unit, target in (
             ("laser", 1e3 * _mean(lasers_s.values()), "ms", 4.5),
             ("laser_std", 1e3 * pstdev(lasers_s.values()), "ms", 1.0),
@@ -234,8 +264,40 @@ def _depths(seed: int) -> Iterator[Row]:
         yield Row(name, arrived, f"of {n}", n, "more", n, note=_told(found))
 
 
-def _times(hz: float, duration_s: float, rng: Random) -> Sequence[float]:
-    first = BEGIN_S + rng.random() / hz
+def _nav2_flows(duration_s: float, seed: int) -> list[Flow]:
+    """The topics of three robots that navigate, each with a phase of its own."""
+    rng = Random(seed)
+    return [
+        Flow(f"{name}_{robot}", kind, size, _times(hz, duration_s, rng, NAV2_BEGIN_S), sender=robot)
+        for robot in range(1, NAV2_ROBOTS + 1)
+        for name, kind, size, hz, _ in NAV2
+    ]
+
+
+def _nav2(
+    row: str, flows: Sequence[Flow], ages_s: Ages, until_s: float, note: str
+) -> Iterator[Row]:
+    """How many messages of each topic arrive, of the robot with the fewest; and the latest."""
+    p99_ms, states_p99_ms, n_robots = 0.0, 0.0, NAV2_ROBOTS
+    for i, (name, *_, target) in enumerate(NAV2):
+        arrived, n = list[float](), 0
+        for flow in flows[i :: len(NAV2)]:
+            found = ages_s[flow.name]
+            due = [k for k, at in enumerate(flow.times) if at < until_s - LATE_S]
+            arrived.append(100 * sum(k in found for k in due) / len(due))
+            n += len(due)
+            late_ms = 1e3 * _quantile(found.values(), 0.99)
+            if target is not None:
+                p99_ms = max(p99_ms, late_ms)
+            if name in NAV2_STATES:
+                states_p99_ms = max(states_p99_ms, late_ms)
+        yield Row(f"{row}_{name}_pct", min(arrived), "%", target, "more", n, note=note)
+    yield Row(f"{row}_p99_ms", p99_ms, "ms", NAV2_P99_MS, "less", n_robots, note=note)
+    yield Row(f"{row}_states_p99_ms", states_p99_ms, "ms", NAV2_P99_MS, "less", n_robots, note=note)
+
+
+def _times(hz: float, duration_s: float, rng: Random, begin_s: float = BEGIN_S) -> Sequence[float]:
+    first = begin_s + rng.random() / hz
     return [first + i / hz for i in range(int(hz * duration_s))]
 
 

@@ -1,16 +1,19 @@
-"""The same with whole programs: two daemons, and the hub of their air, in real time."""
+"""The same with whole programs: daemons, and the hub of their air, in real time."""
 
 import struct
 import tempfile
 import threading
 import time
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import msgspec
+
 from benchmarks import processes
 from benchmarks.daemons import hears_one, wait_for
-from benchmarks.defaults.team import CDR, LISTENER, SENDER, Flow, written
+from benchmarks.defaults.team import CDR, Flow, listener_of, robots_of, written
 from sdrlinkd.client import ControlClient, Publisher, Subscriber
 
 QUIET = ("--log-level", "warning")
@@ -19,10 +22,6 @@ duration_s = 3600.0
 [air]
 rate_hz = 2e6
 snr_db = 25.0
-[[robot]]
-id = 1
-[[robot]]
-id = 2
 """
 RATE = "2 Msps"
 """What this machine keeps up with; `init` writes 5 Msps."""
@@ -35,43 +34,48 @@ Ages = Mapping[str, Mapping[int, float]]
 
 
 def drive_daemons(flows: Sequence[Flow], mcs: int | None, rest_s: float = REST_S) -> Ages:
-    """Let one daemon send all messages of `flows`, and hear them from the other.
+    """Let the daemons of a team send all messages of `flows`, and hear them from each other.
 
     Raises PeerError.
     """
+    robots = robots_of(flows)
     with tempfile.TemporaryDirectory(prefix="benchmark-") as name, ExitStack() as stack:
-        folders = _start(stack, Path(name), mcs)
-        with ControlClient(folders[SENDER]) as control:
-            for flow in flows:
-                arguments: dict[str, bool | int | float | str | bytes | None] = {
-                    "name": f"/robot_{SENDER}/{flow.name}", "type": flow.type,
-                    "reliability": flow.reliability, "durability": flow.durability,
-                    "depth": flow.depth,
-                }  # fmt: skip
-                control.ask("declare", arguments)
+        folders = _start(stack, Path(name), mcs, robots)
+        for flow in flows:
+            with ControlClient(folders[flow.sender]) as control:
+                control.ask("declare", msgspec.to_builtins(flow.declaration))
         due = sorted((at, i, n) for i, flow in enumerate(flows) for n, at in enumerate(flow.times))
         sent_at: dict[tuple[str, int], float] = {}
-        with _hearing(folders[LISTENER]) as heard_at, Publisher(folders[SENDER]) as out:
-            begin = time.monotonic()
-            for at, i, n in due:
-                flow = flows[i]
-                time.sleep(max(0.0, begin + at - time.monotonic()))
-                payload = (CDR + _NUMBER.pack(n)).ljust(flow.size, b"\0")
-                sent_at[flow.name, n] = time.monotonic()
-                out.send(f"/robot_{SENDER}/{flow.name}", payload, dst=flow.to)
-            time.sleep(rest_s)
-            arrived = dict(heard_at)
+        listeners: defaultdict[int, list[str]] = defaultdict(list)
+        for flow in flows:
+            listeners[listener_of(flow, robots)].append(flow.topic)
+        heard = [
+            stack.enter_context(_hearing(folders[robot], topics))
+            for robot, topics in listeners.items()
+        ]
+        outs = {flow.sender: stack.enter_context(Publisher(folders[flow.sender])) for flow in flows}
+        begin = time.monotonic()
+        for at, i, n in due:
+            flow = flows[i]
+            time.sleep(max(0.0, begin + at - time.monotonic()))
+            payload = (CDR + _NUMBER.pack(n)).ljust(flow.size, b"\0")
+            sent_at[flow.name, n] = time.monotonic()
+            outs[flow.sender].send(flow.topic, payload, dst=flow.to)
+        time.sleep(rest_s)
+        arrived = {key: at for each in heard for key, at in dict(each).items()}
     ages: dict[str, dict[int, float]] = {flow.name: {} for flow in flows}
     for (topic, n), at in arrived.items():
         ages[topic][n] = at - sent_at[topic, n]
     return ages
 
 
-def _start(stack: ExitStack, folder: Path, mcs: int | None) -> dict[int, Path]:
+def _start(
+    stack: ExitStack, folder: Path, mcs: int | None, robots: Sequence[int]
+) -> dict[int, Path]:
     """Start the hub and the daemons; returns the folders of their sockets, once they hear."""
-    paths = written(folder, mcs, RATE)
+    paths = written(folder, mcs, RATE, robots)
     scenario = folder / "scenario.toml"
-    scenario.write_text(AIR)
+    scenario.write_text(AIR + "".join(f"[[robot]]\nid = {robot}\n" for robot in robots))
     hub = ("sdrlinkd.cli.ether", str(scenario), "--dir", str(folder))
     started = [processes.start_module(stack, "hub", *hub)]
     for robot, path in paths.items():
@@ -83,13 +87,14 @@ def _start(stack: ExitStack, folder: Path, mcs: int | None) -> dict[int, Path]:
 
 
 @contextmanager
-def _hearing(folder: Path) -> Iterator[dict[tuple[str, int], float]]:
-    """Note when each message came first, by topic and number."""
+def _hearing(folder: Path, topics: Sequence[str]) -> Iterator[dict[tuple[str, int], float]]:
+    """Note when each message of other robots' `topics` came first, by topic and number."""
     found: dict[tuple[str, int], float] = {}
     is_over = threading.Event()
 
     def hear() -> None:
-        with Subscriber(f"/rx_robot_{SENDER}/*", runtime_dir=folder, depth=0) as heard:
+        names = [f"/rx_{topic.removeprefix('/')}" for topic in topics]
+        with Subscriber(*names, runtime_dir=folder, depth=0) as heard:
             while not is_over.is_set():
                 message = heard.receive(0.1)
                 if message is not None:

@@ -27,7 +27,10 @@ _NUMBER = struct.Struct("<I")
 
 
 class Flow(NamedTuple):
-    """A topic that the sender declares, and when it has messages of how many bytes."""
+    """A topic that a robot declares, and when it has messages of how many bytes.
+
+    The topics of all robots of a drive have different names.
+    """
 
     name: str
     type: str
@@ -38,18 +41,36 @@ class Flow(NamedTuple):
     depth: int = 0
     to: int | None = None
     """The robot that it commands."""
+    sender: int = SENDER
+
+    @property
+    def topic(self) -> str:
+        """Its name on the bus."""
+        return f"/robot_{self.sender}/{self.name}"
+
+    @property
+    def declaration(self) -> Declaration:
+        """What its producer tells of it."""
+        return Declaration(
+            name=self.topic, type=self.type, reliability=self.reliability,
+            durability=self.durability, depth=self.depth,
+        )  # fmt: skip
 
 
 class Air(NamedTuple):
     """The air of a drive; MCS None: it adapts, as `init` writes.
 
-    The sender's radio sends nothing in the period `silent`, and nothing is heard in `unheard`.
+    The sender's radio sends nothing in the period `silent`, and nothing is heard in `unheard`. With
+    `react_s`, a radio needs so long from hearing to sending, in s.
     """
 
     mcs: int | None = MCS
     is_half_duplex: bool = False
     silent: Outage = Outage(0.0, 0.0)
     unheard: Outage = Outage(0.0, 0.0)
+    react_s: float = 0.0
+    rate: str = ""
+    """Rate of the channel, as text; empty: as `init` writes it."""
 
 
 FULL_DUPLEX = Air()
@@ -62,32 +83,40 @@ class Drive(NamedTuple):
     config: Config
 
 
+def robots_of(flows: Sequence[Flow]) -> range:
+    """The robots of a team with these flows: two, or more if more of them send."""
+    return range(1, 1 + max(LISTENER, *(flow.sender for flow in flows)))
+
+
+def listener_of(flow: Flow, robots: Sequence[int]) -> int:
+    """The robot at which messages count as arrived: the one after their sender."""
+    return robots[robots.index(flow.sender) + 1 - len(robots)]
+
+
 def drive(flows: Sequence[Flow], until_s: float, seed: int, air: Air = FULL_DUPLEX) -> Drive:
-    """Let one robot of two send all messages of `flows`, and the other hear them, until then."""
+    """Let the robots send all messages of `flows`, and hear each other, until then."""
+    robots = robots_of(flows)
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
         setups = {
             node: make_setup(load_config(path), directory)
-            for node, path in written(directory, air.mcs).items()
+            for node, path in written(directory, air.mcs, air.rate, robots).items()
         }
-    setup = setups[SENDER]
-    config = setup.config
+    config = setups[SENDER].config
     links = {node: link_of(each, Random(100 * seed + node)) for node, each in setups.items()}
-    policies, topics = Policies(setup, links[SENDER]), {}
+    policies = {node: Policies(setup, links[node]) for node, setup in setups.items()}
+    topics: dict[tuple[int, int], Flow] = {}
     for flow in flows:
-        declaration = Declaration(
-            name=f"/robot_{SENDER}/{flow.name}", type=flow.type,
-            reliability=flow.reliability, durability=flow.durability, depth=flow.depth,
-        )  # fmt: skip
-        offer = declaration.offer(setup.name_on_air(declaration.name))
-        topic_id = links[SENDER].declare(offer).id
-        policies.offer(topic_id, declaration)
-        topics[topic_id] = flow
+        node, declaration = flow.sender, flow.declaration
+        offer = declaration.offer(setups[node].name_on_air(declaration.name))
+        topic_id = links[node].declare(offer).id
+        policies[node].offer(topic_id, declaration)
+        topics[node, topic_id] = flow
     ages: dict[str, dict[int, float]] = {flow.name: {} for flow in flows}
 
     def listen(node: int, message: Delivered, now: float) -> None:
-        if node == LISTENER:
-            flow = topics[message.topic_id]
+        flow = topics[message.src, message.topic_id]
+        if node == listener_of(flow, robots):
             number = _NUMBER.unpack_from(message.payload, len(CDR))[0]
             ages[flow.name].setdefault(number, now - flow.times[number])
 
@@ -97,7 +126,9 @@ def drive(flows: Sequence[Flow], until_s: float, seed: int, air: Air = FULL_DUPL
         params, world,
         {node: RadioParams(full_duplex=not air.is_half_duplex) for node in links}, links,
         config.modem, Airtimes(config.modem, config.link.pdu_size), config.access,
-        {SENDER: _arrivals(topics)}, rate=config.rate, seed=seed, listen=listen,
+        {node: _arrivals(node, topics) for node in robots}, rate=config.rate, seed=seed,
+        fit=lambda traits: traits._replace(react_s=max(traits.react_s, air.react_s)),
+        listen=listen,
     )  # fmt: skip
     if any(air.silent):
         begin_s, end_s = air.silent
@@ -106,15 +137,17 @@ def drive(flows: Sequence[Flow], until_s: float, seed: int, air: Air = FULL_DUPL
     return Drive(ages, config)
 
 
-def written(directory: Path, mcs: int | None, rate: str = "") -> dict[int, Path]:
+def written(
+    directory: Path, mcs: int | None, rate: str = "", robots: Sequence[int] = (SENDER, LISTENER)
+) -> dict[int, Path]:
     """The files of `init` for a team whose producers declare their topics, with a fixed MCS.
 
     `rate` is that of the channel, as text; empty: as `init` writes it.
     """
     radio = RADIOS["ether"]
     radio = radio._replace(rate=rate or radio.rate)
-    team = Team(radio, 2, "", "", [], directory, directory)
-    for name, text in team_files(team, [SENDER, LISTENER]).items():
+    team = Team(radio, len(robots), "", "", [], directory, directory)
+    for name, text in team_files(team, list(robots)).items():
         if name != REGISTRY:
             lines = text.splitlines()
             if mcs is not None:
@@ -122,15 +155,18 @@ def written(directory: Path, mcs: int | None, rate: str = "") -> dict[int, Path]
                 lines = fixed.splitlines()
             declared = [line for line in lines if not line.startswith("registry =")]
             (directory / name).write_text("\n".join(declared))
-    return {node: directory / f"robot_{node}.toml" for node in (SENDER, LISTENER)}
+    return {node: directory / f"robot_{node}.toml" for node in robots}
 
 
-def _arrivals(topics: Mapping[int, Flow]) -> Iterator[Arrival]:
-    """All messages in order of time; each begins with its number."""
+def _arrivals(node: int, topics: Mapping[tuple[int, int], Flow]) -> Iterator[Arrival]:
+    """All messages of a robot in order of time; each begins with its number."""
     due = [
-        (at, topic_id, n) for topic_id, flow in topics.items() for n, at in enumerate(flow.times)
+        (at, topic_id, n)
+        for (src, topic_id), flow in topics.items()
+        for n, at in enumerate(flow.times)
+        if src == node
     ]
     for at, topic_id, n in sorted(due):
-        flow = topics[topic_id]
+        flow = topics[node, topic_id]
         wishes = AS_CONFIGURED if flow.to is None else Overrides(dst=flow.to)
         yield Arrival(at, topic_id, (CDR + _NUMBER.pack(n)).ljust(flow.size, b"\0"), wishes)

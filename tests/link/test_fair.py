@@ -181,6 +181,57 @@ def test_reliability_and_lifespans_do_not_change_the_order_of_topics(qos):
     assert air.sent[0] == pytest.approx(air.sent[1], abs=PDU_SIZE)
 
 
+MOST_BYTES = 200_000
+
+
+@pytest.mark.slow
+@law(10)
+@given(
+    n=st.sampled_from([2, 5, 20, 239]),
+    size=st.sampled_from([30, 1000, 20_000, 150_000]),
+    jumps=st.booleans(),
+    seed=st.integers(0, 2**32),
+)
+def test_a_producer_that_offers_a_hundred_times_the_air_harms_nobody_else(n, size, jumps, seed):
+    """Its own messages fill the queue, and only they are dropped: all of them under a name."""
+    rng = Random(seed)
+    air = Air(n + 1, seed=seed, queue=QueueParams(max_bytes=MOST_BYTES, max_messages=300))
+    sizes = [rng.choice((20, 150, 400)) for _ in range(n)]
+    # Each of the others asks for its share at most, and they come in heaps.
+    n_pdus = [1 + (each + 20) // (ROOM - 20) for each in sizes]
+    period_s = 1.1 * (n + 1) * max(n_pdus) * PDU_S
+    due = [rng.choice((0.0, 0.5, rng.random())) * period_s for _ in range(n)]
+    sent, flood_at, lasts_s = 0, 0.0, 3 * period_s
+    times, each = 100.0, size
+    while air.now < lasts_s:
+        for i in range(n):
+            while due[i] <= air.now:
+                assert air.submit(i, 1, sizes[i], due[i]) is None
+                due[i] += period_s
+                sent += 1
+        while flood_at <= air.now:
+            if jumps and rng.random() < 0.1:
+                times, each = rng.choice((0.1, 1.0, 100.0)), rng.choice((30, 1000, 50_000))
+            for _ in range(min(400, max(1, round(times * BURST * ROOM / each)))):
+                air.submit(n, 0, each, air.now)
+            flood_at = air.now + BURST * PDU_S
+        if not air.step():
+            air.now = min(*due, flood_at)
+        tx = air.link.report(air.now).tx
+        assert tx.queued_bytes <= MOST_BYTES
+        assert tx.queued <= 300
+    while air.step():
+        pass
+    reports = {each.topic_id: each for each in air.link.report(air.now).topics}
+    others = [reports[topic] for topic in air.topics[:n]]
+    assert [each.dropped for each in others] == [{}] * n
+    assert sum(each.sent for each in others) == sent
+    greedy = reports[air.topics[n]]
+    assert greedy.accepted == greedy.sent + sum(greedy.dropped.values())
+    assert set(greedy.dropped) <= {"tx_overflow_old", "tx_overflow_new"}
+    assert air.link.audit() == []
+
+
 def served(outbox, n):
     """The topics of the next messages that are sent whole, as of PDUs of 64 octets."""
     topics = []

@@ -24,7 +24,8 @@ MESSAGE_OVERHEAD = ENTRY_HEADER_SIZE + STAMP_SIZE
 class Outbox:
     """The queue of one node, which sends PDUs of `pdu_size` bytes.
 
-    The cost of an operation does not depend on the queue's length.
+    The cost of an operation does not depend on the queue's length. In a queue that overflows, it
+    depends on the number of topics.
     """
 
     def __init__(self, limits: QueueParams, pdu_size: int) -> None:
@@ -66,8 +67,7 @@ class Outbox:
             while topic.messages and topic.n_bytes + size > of_topic:
                 self.lives.drop(self._withdraw_waiting(topic.oldest), "tx_topic_full")
         while self.queued >= limits.max_messages or self.queued_bytes + size > most:
-            victim = self._oldest_of_lowest_class()
-            self.lives.drop(self._withdraw_waiting(victim), "tx_overflow_old")
+            self.lives.drop(self._withdraw_waiting(self._victim()), "tx_overflow_old")
         self._enqueue(message, policy.weight)
         return None
 
@@ -254,9 +254,24 @@ class Outbox:
             and sum(self._class_bytes[qos] for qos in higher) + size <= most_bytes
         )
 
-    def _oldest_of_lowest_class(self) -> Outgoing:
+    def _victim(self) -> Outgoing:
+        """The oldest message of the topic that fills the queue, in the lowest class.
+
+        That is the one with the most octets that wait, or messages if there are too many of these,
+        for its weight. So a topic that floods the queue loses messages, and no other does.
+        """
         lowest = max(qos for qos, queue in self._by_class.items() if queue)
-        return next(iter(self._by_class[lowest]))
+        is_by_number = self.queued >= self._limits.max_messages
+
+        def fills(lane: Lane) -> tuple[float, float]:
+            topic = self._by_topic[lane.topic_id]
+            n = len(topic.messages) if is_by_number else topic.n_bytes
+            return n / lane.account.weight, -lane.waiting[0].arrived_at
+
+        levels = (level for level in self.levels if level.qos is lowest)
+        return max(
+            (lane for level in levels for lane in level.lanes if lane.waiting), key=fills
+        ).waiting[0]
 
     def _withdraw_waiting(self, message: Outgoing) -> Outgoing:
         """Remove `message`; the oldest of its class or topic is the first of its lane."""
