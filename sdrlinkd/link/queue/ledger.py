@@ -19,7 +19,7 @@ TX_REASONS = {
     "tx_bad_transform": "not a tf2_msgs/TFMessage ([tf])",
     "tx_superseded": "replaced by a newer message of the topic (depth)",
     "tx_topic_full": "the topic's own queue limit; its oldest message was dropped",
-    "tx_overflow_old": "shed from a full queue: the oldest of the topic that fills the lowest class",
+    "tx_overflow_old": "shed from a full queue: the oldest of the topic that fills its class",
     "tx_overflow_new": "refused by a full queue that holds only higher classes",
     "tx_expired": "its lifespan (its own, its topic's or its class's) ended before it was sent",
     "tx_too_slow": "a command that takes longer on the air than its lifespan",
