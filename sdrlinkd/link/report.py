@@ -145,7 +145,8 @@ class Reporter:
             "reassembly.timeout_s at all robots"
             for topic_id in self._composer.report().starved
         ]
-        notices += self._never_met(scheduler.least_s) + scheduler.access_notices(now)
+        notices += self._never_met(scheduler.least_s) + self._stopped(scheduler.round_s)
+        notices += scheduler.access_notices(now)
         notices += refused_notices(self._own_id, self.reserved())
         notices += self._heard_topics.notices()
         notices += self._sealing.notices(now)
@@ -180,6 +181,18 @@ class Reporter:
                     f"composing and sending one PDU takes {1e3 * least_s:.3g} ms"
                 )
         return notices
+
+    def _stopped(self, round_s: float) -> list[str]:
+        """Sentences on commands whose dead-man stops this robot between two turns of the sender."""
+        reports = self._reception.report_topics()
+        ages = [self._reception.report_ages(each.src, each.topic_id) for each in reports]
+        return [
+            f"{each.name.removeprefix('/')} from robot {each.src}: deadman_s of "
+            f"{age.deadman_s:.3g} s has stopped this robot ({age.stops} times), as a turn to send "
+            f"comes only every {round_s:.3g} s; raise topic.NAME.deadman_s"
+            for each, age in zip(reports, ages, strict=True)
+            if age.stops and age.deadman_s <= round_s
+        ]
 
     def _counters(self, sent_s: float) -> dict[Hashable, int]:
         """All counters for which rates are reported; airtimes are in µs."""

@@ -9,7 +9,16 @@ import zstandard
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.link import Outcome, Overrides, Qos, QueueParams, TopicPolicy
+from sdrlinkd.link import (
+    AccessParams,
+    Outcome,
+    Overrides,
+    PduLinkTraits,
+    Qos,
+    QueueParams,
+    RateParams,
+    TopicPolicy,
+)
 from sdrlinkd.link.queue import Inflated
 from sdrlinkd.wire import Entry, Pdu, build
 from tests.laws import law
@@ -258,3 +267,19 @@ def test_a_frame_of_many_times_its_size_is_neither_sent_nor_taken_in_the_clear()
     for pdu in pdus:
         assert stranger.hear(pdu, 0.0) == []
     assert received(stranger)[1, 0].dropped["rx_inflates"] == 1
+
+
+@pytest.mark.parametrize(("deadman_s", "is_told"), [(0.5, True), (0.7, False)])
+def test_a_dead_man_that_stops_a_robot_between_two_turns_is_named(deadman_s, is_told):
+    sender, receiver = make_link(1), make_link(2, seed=2)
+    tdma = AccessParams(policy="tdma", nodes=[1, 2], slot_s=0.3)
+    traits = PduLinkTraits(senses=True, shares_air=True, longest_burst_s=(0.01,))
+    receiver.use(receiver.attach(traits, tdma, RateParams()))
+    receiver.set_policy(0, TopicPolicy(deadman_s=deadman_s))
+    sender.submit(0, CDR + bytes(48), 0.0)
+    (message,) = receiver.hear(compose(sender, 0.0).pdus[0], 0.0)
+    receiver.delivered(message, 0.0)
+    assert not any("deadman_s" in each for each in receiver.notices(0.1))
+    assert receiver.take_silent(1.0) == [(1, 0)]
+    told = [each for each in receiver.notices(1.0) if "a turn to send comes only every 0.6" in each]
+    assert bool(told) == is_told

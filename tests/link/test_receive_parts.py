@@ -428,7 +428,7 @@ def message(src=9, topic=ODOM, origin_at=1.0, began_at=1.25):
 
 def test_the_age_at_handover_and_its_parts():
     handover = Handover()
-    assert handover.report(9, 0) == (None, None, None, None, 0)
+    assert handover.report(9, 0) == (None, None, None, None, 0, 0.0)
     assert handover.deliver(message(origin_at=None), TopicPolicy(), 2.0) is None
     assert handover.report(9, 0).latency is None
     assert message(origin_at=None).parts(2.0) == (0.0, 0.25, 0.125, 0.375)

@@ -13,7 +13,7 @@ from sdrlinkd.wire import Waits
 class AgeReport(NamedTuple):
     """How late messages of one topic from one source arrived; None: no STAMP came.
 
-    `stops` is the number of stop messages published because the topic fell silent.
+    `stops` is the number of stop messages published because the topic fell silent for `deadman_s`.
     """
 
     last_ms: float | None = None
@@ -21,6 +21,7 @@ class AgeReport(NamedTuple):
     p99_ms: float | None = None
     latency: LatencyReport | None = None
     stops: int = 0
+    deadman_s: float = 0.0
 
 
 class Handover:
@@ -31,6 +32,8 @@ class Handover:
         self._waits: dict[tuple[int, int], Waits] = {}
         """Why messages waited at their source, as the source reports."""
         self._deadman = Deadman()
+        self._deadman_s: dict[tuple[int, int], float] = {}
+        """The times of the dead-man timers that a message has set."""
         self._commands: dict[tuple[int, str], tuple[int, int]] = {}
         """From where the last message of a command topic came, by whose topic it is."""
 
@@ -39,6 +42,7 @@ class Handover:
         key = message.src, message.topic_id
         if policy.deadman_s:
             self._deadman.fresh(*key, now, policy.deadman_s)
+            self._deadman_s[key] = policy.deadman_s
             # What comes from a robot itself and over gateways is one stream of commands.
             whose = message.topic.origin(message.src), message.topic.at_origin
             before = self._commands.setdefault(whose, key)
@@ -71,16 +75,18 @@ class Handover:
 
     def report(self, src: int, topic_id: int) -> AgeReport:
         """How late messages of a topic from robot `src` arrived, and why."""
-        key, stops = (src, topic_id), self._deadman.stops.get((src, topic_id), 0)
+        key = src, topic_id
+        stops, deadman_s = self._deadman.stops.get(key, 0), self._deadman_s.get(key, 0.0)
         latency = self._latencies.get(key)
         if latency is None:
-            return AgeReport(stops=stops)
+            return AgeReport(stops=stops, deadman_s=deadman_s)
         return AgeReport(
             latency.last_ms(),
             latency.quantile_ms(0.5),
             latency.quantile_ms(0.99),
             _latency_report(latency, self._waits.get(key)),
             stops,
+            deadman_s,
         )
 
 

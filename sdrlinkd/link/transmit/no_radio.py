@@ -17,7 +17,7 @@ class NoRadio:
     bytes_per_s = inf
     airtime_s = 0.0
     record_pdu_s = 0.0
-    least_s = 0.0
+    least_s = round_s = 0.0
     has_work = False
 
     def more_to_send(self) -> None:

@@ -339,6 +339,11 @@ class BurstScheduler:
         return self._fit.least_s
 
     @property
+    def round_s(self) -> float:
+        """Longest time in s until every robot has had a turn; 0 if there are no turns."""
+        return self._access.round_s
+
+    @property
     def record_pdu_s(self) -> float:
         """Airtime lost to a PDU that holds only records, in s, including turnarounds."""
         return self._fit.record_pdu_s
