@@ -44,7 +44,8 @@ ROWS = {
         "400kB_best_effort", "1500kB_reliable",
         *(f"alone_{size}_pct" for size in ("50kB", "400kB", "800kB", "1500kB")),
         *(
-            f"{each}_{air}" for air in ("1ch", "1ch_both", "full_duplex", "1ch_adaptive")
+            f"{each}_{air}"
+            for air in ("1ch", "1ch_both", "full_duplex", "1ch_adaptive", "1ch_sealed")
             for each in ("laser", "laser_std", "laser_p99", "image", "image_pct")
         ),
         *(

@@ -37,6 +37,7 @@ HALF_DUPLEX = Air(is_half_duplex=True)
 SEED_AIRS = {
     "1ch": HALF_DUPLEX, "1ch_both": HALF_DUPLEX, "full_duplex": Air(),
     "1ch_adaptive": Air(None, is_half_duplex=True),
+    "1ch_sealed": Air(is_half_duplex=True, is_sealed=True),
 }  # fmt: skip
 LONG_S = 20.0
 DAEMONS_MCS = 6
@@ -53,7 +54,9 @@ NAV2 = (
 """Topic, type, bytes and messages per s of a robot that navigates, 1.2 Mbit/s in all; and the
 target of those that arrive, in %."""
 NAV2_STATES = ("odom", "tf", "joints", "scan")
-NAV2_ROBOTS, NAV2_P99_MS, NAV2_BEGIN_S = 3, 150.0, 4.0
+NAV2_ROBOTS, NAV2_P99_MS = 3, 150.0
+SETTLED_S = 4.0
+"""Time in s from which robots know the MCS for each other, and, sealed, that they are there."""
 PACED = Air(None, is_half_duplex=True, react_s=3e-3, rate=RATE)
 """The air of whole daemons: a radio in real time reacts within 3 ms."""
 LEAST_BIT_S = 1.2e6
@@ -88,7 +91,7 @@ def _rows(seed: int, duration_s: float) -> Iterator[Row]:
     yield from _outage(seed)
     yield from _depths(seed)
     flows = _nav2_flows(duration_s, seed)
-    until_s = NAV2_BEGIN_S + duration_s
+    until_s = SETTLED_S + duration_s
     found = drive(flows, until_s, seed, PACED)
     yield from _nav2("nav2", flows, found.ages_s, until_s, f"reacts in 3 ms; {_told(found)}")
     yield from fairness_rows(seed, 30 if duration_s < LONG_S else 300)
@@ -174,15 +177,22 @@ def _alone(seed: int) -> Iterator[Row]:
 def _seed_workload(seed: int, duration_s: float) -> Iterator[Row]:
     """Pound's laser and image from one of two robots to the other, or from both."""
     for name, air in SEED_AIRS.items():
+        begin_s = SETTLED_S if air.is_sealed else BEGIN_S
         laser, image, *others = [
-            Flow(f"{topic}_{robot}", kind, size, _times(hz, duration_s, Random(seed)), sender=robot)
+            Flow(
+                f"{topic}_{robot}",
+                kind,
+                size,
+                _times(hz, duration_s, Random(seed), begin_s),
+                sender=robot,
+            )
             for robot in ((SENDER, LISTENER) if name == "1ch_both" else (SENDER,))
             for topic, kind, size, hz in (
                 ("scan", SCAN, LASER_SIZE, LASER_HZ),
                 ("image", IMAGE, PICTURE_SIZE, 1 / PICTURE_S),
             )
         ]
-        until_s = BEGIN_S + duration_s
+        until_s = begin_s + duration_s
         found = drive([laser, image, *others], until_s, seed, air)
         lasers_s, images_s = found.ages_s[laser.name], found.ages_s[image.name]
         due = [i for i, at in enumerate(image.times) if at < until_s - LATE_S]
@@ -268,7 +278,7 @@ def _nav2_flows(duration_s: float, seed: int) -> list[Flow]:
     """The topics of three robots that navigate, each with a phase of its own."""
     rng = Random(seed)
     return [
-        Flow(f"{name}_{robot}", kind, size, _times(hz, duration_s, rng, NAV2_BEGIN_S), sender=robot)
+        Flow(f"{name}_{robot}", kind, size, _times(hz, duration_s, rng, SETTLED_S), sender=robot)
         for robot in range(1, NAV2_ROBOTS + 1)
         for name, kind, size, hz, _ in NAV2
     ]
@@ -325,7 +335,8 @@ def _sized(size: int) -> str:
 def _told(found: Drive) -> str:
     modem = found.config.modem
     mcs = "the MCS adapts" if found.config.rate.adapt else f"overridden: MCS {modem.mcs}, fixed"
-    return f"{modem.rate_hz / 1e6:g} Msps as init writes it; {mcs}"
+    sealed = ", sealed" if found.config.security.mode != "off" else ""
+    return f"{modem.rate_hz / 1e6:g} Msps as init writes it{sealed}; {mcs}"
 
 
 def _options() -> argparse.ArgumentParser:

@@ -3,6 +3,7 @@
 import struct
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Literal, NamedTuple
@@ -17,12 +18,16 @@ from sdrlinkd.link import AS_CONFIGURED, Delivered, Overrides
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.offers import Declaration
 from sdrlinkd.policies import Policies
+from sdrlinkd.sealing import Key, Remembered, Sealing
 
 SENDER, LISTENER = 1, 2
 MCS = 3
 """16QAM 1/2, where `init` writes that the link adapts."""
 SNR_DB = 25.0
 CDR = b"\0\1\0\0"
+KEY = Key(0, bytes(range(32)))
+REMEMBER_S = 0.1
+"""Time in s between two times that a robot's disk takes what its sealing must remember."""
 _NUMBER = struct.Struct("<I")
 
 
@@ -71,6 +76,7 @@ class Air(NamedTuple):
     react_s: float = 0.0
     rate: str = ""
     """Rate of the channel, as text; empty: as `init` writes it."""
+    is_sealed: bool = False
 
 
 FULL_DUPLEX = Air()
@@ -95,15 +101,27 @@ def listener_of(flow: Flow, robots: Sequence[int]) -> int:
 
 def drive(flows: Sequence[Flow], until_s: float, seed: int, air: Air = FULL_DUPLEX) -> Drive:
     """Let the robots send all messages of `flows`, and hear each other, until then."""
-    robots = robots_of(flows)
+    robots, rng = robots_of(flows), Random(seed)
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
         setups = {
             node: make_setup(load_config(path), directory)
-            for node, path in written(directory, air.mcs, air.rate, robots).items()
+            for node, path in written(
+                directory, air.mcs, air.rate, robots, is_sealed=air.is_sealed
+            ).items()
         }
     config = setups[SENDER].config
-    links = {node: link_of(each, Random(100 * seed + node)) for node, each in setups.items()}
+    sealing = {
+        node: Sealing(
+            node, config.link.pdu_size, config.security, [KEY], Remembered(), rng.randbytes
+        )
+        for node in robots
+        if air.is_sealed
+    }
+    links = {
+        node: link_of(each, Random(100 * seed + node), sealing.get(node))
+        for node, each in setups.items()
+    }
     policies = {node: Policies(setup, links[node]) for node, setup in setups.items()}
     topics: dict[tuple[int, int], Flow] = {}
     for flow in flows:
@@ -130,6 +148,9 @@ def drive(flows: Sequence[Flow], until_s: float, seed: int, air: Air = FULL_DUPL
         fit=lambda traits: traits._replace(react_s=max(traits.react_s, air.react_s)),
         listen=listen,
     )  # fmt: skip
+    for i in range(int(until_s / REMEMBER_S)):
+        for each in sealing.values():
+            simulation.call(i * REMEMBER_S, partial(_remember, each, i * REMEMBER_S))
     if any(air.silent):
         begin_s, end_s = air.silent
         simulation.call(begin_s, lambda: simulation.silence(SENDER, end_s))
@@ -138,15 +159,16 @@ def drive(flows: Sequence[Flow], until_s: float, seed: int, air: Air = FULL_DUPL
 
 
 def written(
-    directory: Path, mcs: int | None, rate: str = "", robots: Sequence[int] = (SENDER, LISTENER)
-) -> dict[int, Path]:
+    directory: Path, mcs: int | None, rate: str = "",
+    robots: Sequence[int] = (SENDER, LISTENER), *, is_sealed: bool = False,
+) -> dict[int, Path]:  # fmt: skip
     """The files of `init` for a team whose producers declare their topics, with a fixed MCS.
 
     `rate` is that of the channel, as text; empty: as `init` writes it.
     """
     radio = RADIOS["ether"]
     radio = radio._replace(rate=rate or radio.rate)
-    team = Team(radio, len(robots), "", "", [], directory, directory)
+    team = Team(radio, len(robots), "", "", [], directory, directory, is_sealed=is_sealed)
     for name, text in team_files(team, list(robots)).items():
         if name != REGISTRY:
             lines = text.splitlines()
@@ -156,6 +178,12 @@ def written(
             declared = [line for line in lines if not line.startswith("registry =")]
             (directory / name).write_text("\n".join(declared))
     return {node: directory / f"robot_{node}.toml" for node in robots}
+
+
+def _remember(sealing: Sealing, now: float) -> None:
+    wanted = sealing.memory.wanted(now)
+    if wanted is not None:
+        sealing.memory.written(wanted)
 
 
 def _arrivals(node: int, topics: Mapping[tuple[int, int], Flow]) -> Iterator[Arrival]:
