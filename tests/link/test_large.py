@@ -179,6 +179,35 @@ def test_the_largest_and_one_octet_more():
     assert [m.payload for m in hear(receiver, pdus_of(sender))] == [image(most)]
 
 
+@pytest.mark.slow
+def test_8_mib_at_1_mbit_per_s_take_a_minute_and_hold_nobody_up():
+    """The other topic is of the same class, and has less than its share."""
+    sender, receiver = pair(1100)
+    payload, pdu_s, period_s = image(8 << 20), 1100 * 8 / 1e6, 1 / 30
+    assert sender.submit(1, payload, 0.0) is None
+    now, due, got, waits = 0.0, 0.0, b"", []
+    while not got:
+        while due <= now:
+            sender.submit(0, image(724), due)
+            due += period_s
+        burst = compose(sender, now, 1)
+        now += pdu_s
+        sender.confirm(burst, Outcome.SENT, now)
+        for message in hear(receiver, burst.pdus, now):
+            if message.topic_id == 1:
+                got = message.payload
+            else:
+                waits.append(now - message.origin_at)
+        if len(waits) % 50 == 0:
+            assert rx(receiver).held_bytes <= ReassemblyParams().source_bytes
+    assert got == payload
+    assert max(waits) <= 4 * pdu_s
+    assert len(waits) >= now / period_s - 3
+    # The parity of its parts is a tenth; the other topic takes a PDU each time.
+    assert now < 1.3 * 8 * len(payload) / 1e6 / (1 - pdu_s / period_s)
+    assert sender.audit() == receiver.audit() == []
+
+
 def test_without_numbers_it_is_refused_and_its_parts_are_of_an_unknown_topic():
     sender, _ = pair()
     plain = make_link(2, pdu_size=64)
