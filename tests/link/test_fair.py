@@ -58,6 +58,8 @@ class Air:
         self.now = 0.0
         self.sent = Counter()
         """Octets by topic, with those of headers, and of what PDUs leave unused."""
+        self.turns = Counter()
+        """Of these, those of the first topic of each PDU; others fill the room that it leaves."""
         self.done_at = {}
         """When the last fragment of a message had left, by the number that it begins with."""
 
@@ -87,6 +89,8 @@ class Air:
                 self.sent[self.topics.index(topic)] += n
             for message in carried:
                 self.sent[self.topics.index(message.topic_id)] += max(0, unused)
+            if own:
+                self.turns[self.topics.index(own[0][0])] += own[0][1]
         link.confirm(burst, Outcome.SENT, self.now)
         return True
 
@@ -114,9 +118,33 @@ def test_topics_that_always_have_something_get_air_by_their_weights(n, seed):
         assert air.step()
     for i in range(n):
         for j in range(n):
-            off = air.sent[i] / weights[i] - air.sent[j] / weights[j]
+            # What others could not use may be more than a topic's share.
+            off = air.turns[i] / weights[i] - air.sent[j] / weights[j]
             ahead = AHEAD * PDU_SIZE * (1 / weights[i] + 1 / weights[j])
             assert off <= ahead
+
+
+@pytest.mark.parametrize("seconds", [0.1, 3.0])
+def test_room_that_others_leave_runs_up_no_debt(seconds):
+    """A topic of little weight that lives on it has its share as soon as others take the room."""
+    air = Air(3)
+    weights, sizes = (1.0, 4.0, 4.0), (150, 400, 400)
+    for topic, weight in zip(air.topics, weights, strict=True):
+        air.link.set_policy(topic, TopicPolicy(depth=40, weight=weight))
+
+    def run(until, n):
+        while air.now < until:
+            for i in range(n):
+                for _ in range(2 * BURST):
+                    air.submit(i, 0, sizes[i], air.now)
+            air.step()
+
+    run(seconds, 2)
+    assert air.sent[0] > 1.5 * air.sent[1] / 4, "the control: it has more than its share"
+    before = air.sent.copy()
+    run(seconds + 0.6, 3)
+    sent = air.sent - before
+    assert sent[0] > 0.9 * sent.total() / sum(weights)
 
 
 @pytest.mark.slow

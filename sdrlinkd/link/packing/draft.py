@@ -43,13 +43,15 @@ class Draft(PduBuilder):
     `dst` is NO_DST until it holds something of a message: an entry, a STAMP, or parity.
     """
 
-    __slots__ = ("carried", "charged", "dst", "is_compressed", "qos")
+    __slots__ = ("carried", "charged", "dst", "is_compressed", "level_key", "qos")
 
     def __init__(self, pdu_size: int) -> None:
         super().__init__(pdu_size)
         self.carried: list[Outgoing] = []
         self.charged = 0
         """Octets of it that topics were charged for."""
+        self.level_key: tuple[int, int] | None = None
+        """The level of the topic that was charged last."""
         self.dst = NO_DST
         self.is_compressed = False
         self.qos = Qos.BULK
@@ -138,9 +140,15 @@ class EntryWriter:
             if self._parity[head.qos] or head.channel == PARTS:
                 head.follow_with(self._parity_of(head))
             self._end(lane, head, start)
-        draft.charged += length + beside
-        self._outbox.served(lane, length + beside)
+        self._charge(lane, draft, length + beside)
         return True
+
+    def _charge(self, lane: Lane, draft: Draft, octets: int) -> None:
+        """Charge a lane's topic for an entry; behind the first of its level, it fills the PDU."""
+        fills = lane.level_key == draft.level_key
+        draft.charged += octets
+        draft.level_key = lane.level_key
+        self._outbox.served(lane, octets, fills=fills)
 
     def _place_parity(self, lane: Lane, head: Outgoing, draft: Draft, start: float) -> bool:
         """Add parity of `head`, whose fragments have all been composed, to the draft if it fits."""
@@ -159,8 +167,7 @@ class EntryWriter:
         draft.join(head)
         head.ride()
         self._end(lane, head, start)
-        draft.charged += room - draft.room
-        self._outbox.served(lane, room - draft.room)
+        self._charge(lane, draft, room - draft.room)
         return True
 
     def _end(self, lane: Lane, head: Outgoing, start: float) -> None:

@@ -41,7 +41,7 @@ class Level:
         self._head_start = HEAD_START * pdu_size
         self._accounts: dict[int, Account] = {}
         self._now = 0.0
-        """The highest account of a topic when it was served."""
+        """The highest account of a topic whose turn it was, when it was served."""
         self._turn = 0
 
     def lane(self, topic_id: int, dst: int) -> Lane:
@@ -72,10 +72,17 @@ class Level:
             idle = (each for each in self._accounts.values() if not each.lanes)
             del self._accounts[min(idle, key=lambda each: each.spent).topic_id]
 
-    def charge(self, account: Account, octets: float) -> None:
-        """Charge a topic for octets that it sent, and move its lanes back accordingly."""
-        self._now = max(self._now, account.spent)
+    def charge(self, account: Account, octets: float, *, fills: bool = False) -> None:
+        """Charge a topic for octets that it sent, and move its lanes back accordingly.
+
+        `fills`: it was not its turn, but nobody before it could use the room. That counts, but runs
+        up no debt: otherwise the topic would wait for as long when there is no such room any more.
+        """
+        if not fills:
+            self._now = max(self._now, account.spent)
         account.pay(octets)
+        if fills:
+            account.forgive(self._now + 2 * self._head_start / account.weight)
         for lane in account.lanes:
             self.move(lane)
         # A topic that could not be served has saved up no more than one that had nothing to send.

@@ -267,6 +267,10 @@ class Account:
         self.spent += (octets + self.owed) / self.weight
         self.owed = 0.0
 
+    def forgive(self, most: float) -> None:
+        """Forget what was spent beyond `most`."""
+        self.spent = min(self.spent, most)
+
     def catch_up(self, least: float) -> None:
         """Forget what was saved up beyond `least`."""
         self.spent = max(self.spent, least)

@@ -100,12 +100,15 @@ class Outbox:
         head = None if level is None else level.lanes[0].head
         return head.src if head is not None and head.is_whole else None
 
-    def served(self, lane: Lane, octets: int) -> None:
-        """Charge a lane's topic for an entry that it gave, and remove the lane if it is empty."""
+    def served(self, lane: Lane, octets: int, *, fills: bool = False) -> None:
+        """Charge a lane's topic for an entry that it gave, and remove the lane if it is empty.
+
+        `fills`: it was not its turn, but the entry filled a PDU behind one of its level.
+        """
         level = self._level_by_key[lane.level_key]
         if lane.head is None:
             self._follow_up(lane, level)
-        level.charge(lane.account, octets)
+        level.charge(lane.account, octets, fills=fills)
 
     def withdraw_head(self, lane: Lane) -> Outgoing:
         """Remove the lane's head, with all its fragments, and return it."""
