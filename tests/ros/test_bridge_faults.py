@@ -124,8 +124,8 @@ def test_a_daemon_that_ends_and_starts_again_is_waited_for(start_daemon, start, 
             one.node.send(topic="/odom", first=2)
     assert one.bridge.log().count("waiting for the daemon") == 1
     # `sdrlinkctl status` shows it.
-    (notice,) = [each for each in ask(one.daemon, "status")["notices"] if "ROS bridge" in each]
-    assert notice.startswith("ROS bridge: topics out 1 (wanted 1), in 0 (wanted 0)")
+    told = "ROS bridge: topics out 1 (wanted 1), in 0 (wanted 0)"
+    wait_for(lambda: any(told in each for each in ask(one.daemon, "status")["notices"]), WAIT_S)
     assert "messages lost while the daemon was away" in notice
 
 
