@@ -124,9 +124,13 @@ def test_a_daemon_that_ends_and_starts_again_is_waited_for(start_daemon, start, 
             one.node.send(topic="/odom", first=2)
     assert one.bridge.log().count("waiting for the daemon") == 1
     # `sdrlinkctl status` shows it.
-    told = "ROS bridge: topics out 1 (wanted 1), in 0 (wanted 0)"
-    wait_for(lambda: any(told in each for each in ask(one.daemon, "status")["notices"]), WAIT_S)
-    assert "messages lost while the daemon was away" in notice
+
+    def is_told(words):
+        notices = ask(one.daemon, "status")["notices"]
+        return any("ROS bridge: topics out 1 " in each and words in each for each in notices)
+
+    wait_for(lambda: is_told("(wanted 1), in 0 (wanted 0)"), WAIT_S)
+    assert is_told("messages lost while the daemon was away")
 
 
 def test_transforms_of_others_are_merged_and_never_go_back(start_daemon, start, hub):
