@@ -80,6 +80,8 @@ def write_daemon_config(
         "ether": {"dir": str(hub)},
         "modem": {"rate_hz": scenario.air.rate_hz, "frequency_hz": scenario.air.frequency_hz},
         "access": {"nodes": [each.id for each in scenario.robot]},
+        # Each message counts, as in the paper: none replaces another by its type.
+        "topic": {topic.name: {"offer": False} for topic in source.registry.topics},
     }
     if scenario.pace == "lockstep":
         given["play"] = {
