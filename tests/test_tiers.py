@@ -50,6 +50,16 @@ def test_ticking():
 def test_needs_a_moon(): pass
 def test_leaves(): subprocess.Popen(SLEEPER)
 """
+STUBBORN = """
+import contextlib
+from tests import watchdog
+watchdog.LAST_WORDS_S = 0.5
+
+def test_stubborn():
+    while True:
+        with contextlib.suppress(BaseException):
+            while True: pass
+"""
 IGNORING = ("sh", "-c", "trap '' INT; exec \"$@\"", "sh")
 
 
@@ -87,16 +97,29 @@ def test_what_is_left_out_is_told_in_one_line():
     )
 
 
+def run_of(folder, faults):
+    """A run of its own in `folder`, of the items in `faults`."""
+    (folder / "conftest.py").write_text(CONFTEST)
+    (folder / "test_faults.py").write_text(faults)
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", "-c", os.devnull, "-p", "no:cacheprovider",
+         "--rootdir", folder, "-W", "ignore", folder],
+        env={**os.environ, "PYTHONPATH": str(ROOT), "SDRLINK_TRIALS": str(USUAL)},
+        cwd=folder, capture_output=True, text=True, check=False, timeout=200,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_an_item_that_cannot_be_interrupted_is_named_as_the_run_ends(tmp_path):
+    """Such as one that searches for the smallest case that fails, and takes this for one."""
+    done = run_of(tmp_path, STUBBORN)
+    assert done.returncode == 1
+    assert "test_stubborn computes for too long: " in done.stderr
+
+
 @pytest.mark.slow
 def test_a_run_ends_in_time_and_names_each_item_that_is_at_fault(tmp_path):
-    (tmp_path / "conftest.py").write_text(CONFTEST)
-    (tmp_path / "test_faults.py").write_text(FAULTS)
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-c", os.devnull, "-p", "no:cacheprovider",
-         "--rootdir", tmp_path, "-W", "ignore", tmp_path],
-        env={**os.environ, "PYTHONPATH": str(ROOT), "SDRLINK_TRIALS": str(USUAL)},
-        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=200,
-    )  # fmt: skip
+    done = run_of(tmp_path, FAULTS)
     out = done.stdout
     assert done.returncode == 1, out + done.stderr
     said = {

@@ -3,7 +3,6 @@
 import faulthandler
 import os
 import signal
-import sys
 import threading
 from dataclasses import dataclass
 
@@ -38,6 +37,8 @@ class Watchdog(threading.Thread):
         self._watched: tuple[str, Limits] | None = None
         self._changed = threading.Condition()
         self._reason = ""
+        # While a test runs, its standard error goes elsewhere.
+        self._stderr = os.fdopen(os.dup(2), "w")
         signal.signal(signal.SIGALRM, self._fail)
 
     def watch(self, test: str, limits: Limits) -> None:
@@ -84,8 +85,9 @@ class Watchdog(threading.Thread):
                 if self._reason:
                     signal.pthread_kill(threading.main_thread().ident, signal.SIGALRM)
         if not self._moved_on(watched, LAST_WORDS_S):
-            print(f"\n{test} {self._reason}, and cannot be interrupted", file=sys.__stderr__)
-            faulthandler.dump_traceback(sys.__stderr__)
+            words = f"\n{test} {self._reason}, and cannot be interrupted"
+            print(words, file=self._stderr, flush=True)
+            faulthandler.dump_traceback(self._stderr)
             os._exit(1)
 
     def _moved_on(self, watched: tuple[str, Limits], within_s: float) -> bool:

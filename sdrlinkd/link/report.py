@@ -191,7 +191,7 @@ class Reporter:
             f"{age.deadman_s:.3g} s has stopped this robot ({age.stops} times), as a turn to send "
             f"comes only every {round_s:.3g} s; raise topic.NAME.deadman_s"
             for each, age in zip(reports, ages, strict=True)
-            if age.stops and age.deadman_s <= round_s
+            if age.stops and 0 < age.deadman_s <= round_s
         ]
 
     def _counters(self, sent_s: float) -> dict[Hashable, int]:

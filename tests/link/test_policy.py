@@ -281,5 +281,12 @@ def test_a_dead_man_that_stops_a_robot_between_two_turns_is_named(deadman_s, is_
     receiver.delivered(message, 0.0)
     assert not any("deadman_s" in each for each in receiver.notices(0.1))
     assert receiver.take_silent(1.0) == [(1, 0)]
-    told = [each for each in receiver.notices(1.0) if "a turn to send comes only every 0.6" in each]
-    assert bool(told) == is_told
+
+    def told(at):
+        words = "a turn to send comes only every 0.6"
+        return [each for each in receiver.notices(at) if words in each]
+
+    assert bool(told(1.0)) == is_told
+    # It lasts until the policy is another one.
+    receiver.set_policy(0, TopicPolicy())
+    assert told(2.0) == []

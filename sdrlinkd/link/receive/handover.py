@@ -33,7 +33,7 @@ class Handover:
         """Why messages waited at their source, as the source reports."""
         self._deadman = Deadman()
         self._deadman_s: dict[tuple[int, int], float] = {}
-        """The times of the dead-man timers that a message has set."""
+        """The times of the dead-man timers that messages have set."""
         self._commands: dict[tuple[int, str], tuple[int, int]] = {}
         """From where the last message of a command topic came, by whose topic it is."""
 
@@ -70,8 +70,10 @@ class Handover:
         return self._deadman.take_due(now)
 
     def forget(self, topic_id: int) -> None:
-        """Disarm a topic's dead-man timers."""
+        """Disarm a topic's dead-man timers, as its policy has none any more."""
         self._deadman.forget(topic_id)
+        for key in [key for key in self._deadman_s if key[1] == topic_id]:
+            del self._deadman_s[key]
 
     def report(self, src: int, topic_id: int) -> AgeReport:
         """How late messages of a topic from robot `src` arrived, and why."""
