@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis.strategies import text
 
 import phy
 from sdrlinkd.link import Lives
@@ -26,10 +27,12 @@ Lives.is_strict = True
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile the modem once, before all workers, if its source has changed.
 
-    A daemon that a test starts would take its messages meanwhile, and send none.
+    A daemon that a test starts would take its messages meanwhile, and send none. Hypothesis makes
+    its table of characters, which costs seconds in a new clone, and no test should pay for it.
     """
     if not hasattr(session.config, "workerinput"):
         phy.warm_up()
+        text().validate()
 
 
 @pytest.fixture(autouse=True)
