@@ -24,6 +24,7 @@ ETC = Path(__file__).parents[1] / "etc"
 Lives.is_strict = True
 
 
+@pytest.hookimpl(trylast=True)  # Hypothesis refuses its table while it begins itself.
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile the modem once, before all workers, if its source has changed.
 
