@@ -7,7 +7,7 @@ import pytest
 
 from sdrlinkd.link import AccessParams, ClockParams, Outcome, PduLinkTraits, RateParams
 from sdrlinkd.link.receive import Latency, Parts
-from sdrlinkd.wire import Clock, Waits, equal_payload
+from sdrlinkd.wire import SEQ, Clock, Waits, equal_payload
 from tests.link.world import (
     PDU_S,
     compose,
@@ -90,11 +90,13 @@ def test_why_a_message_waited_is_told_in_a_beacon():
 
 def test_what_a_source_tells_of_its_waits_splits_the_wait_of_its_messages():
     sender, receiver = make_link(1), make_link(2)
-    # Unknown topic numbers are useless, but harmless.
-    tell(receiver, 1, *(Waits(topic_id, 1, 2, 3) for topic_id in range(16)), at=0.0)
-    tell(receiver, 1, Waits(0, 60, 20, 20), at=0.0)
     sender.submit(0, bytes(20), 0.0)
-    for pdu in compose(sender, 0.1).pdus:
+    burst = compose(sender, 0.1)
+    # Unknown topic numbers are useless, but harmless.
+    useless = [Waits(topic_id, 1, 2, 3) for topic_id in range(16)]
+    for behind, told in (2, useless), (1, [Waits(0, 60, 20, 20)]):
+        tell(receiver, 1, *told, at=0.0, number=(burst.pdus[0][SEQ] - behind) & 0xFF)
+    for pdu in burst.pdus:
         for message in receiver.hear(pdu, 0.1):
             receiver.delivered(message, 0.1)
     told = received(receiver)[1, 0].latency

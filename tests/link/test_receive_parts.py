@@ -65,7 +65,7 @@ from sdrlinkd.wire import (
     pieces,
 )
 from tests.laws import law
-from tests.link.world import make_link
+from tests.link.world import compose, make_link
 
 TOPICS = make_registry([("odom", "nav_msgs/Odometry"), ("cmd_vel", "geometry_msgs/Twist")])
 FULL = make_registry([(f"t{i}", "a/B") for i in range(16)])
@@ -674,6 +674,30 @@ def test_the_first_time_of_a_pdu_is_no_earlier_than_that_of_the_one_before():
     assert made.first_at(12, 6.0) == 1.5
     made.begin_anew()
     assert made.first_at(11, 6.0) == -inf
+
+
+@pytest.mark.parametrize("newer", [13, 12 + 200])
+def test_a_relay_does_not_tell_when_a_pdu_was_sent_first(newer):
+    made = SequenceTrack()
+    made.heard(10, 0, 1.0)
+    made.heard(11, 0, 2.0, forwarded=Qos.BULK)
+    made.heard(newer, 0, 3.0, forwarded=Qos.BULK)
+    assert made.first_at(12, 4.0) == 1.0
+    relayed = SequenceTrack()
+    relayed.heard(10, 0, 1.0, forwarded=Qos.BULK)
+    relayed.heard(12, 0, 2.0)
+    assert relayed.first_at(11, 4.0) == -inf
+
+
+def test_repeats_of_a_source_whose_numbers_are_not_known_are_no_younger_for_it():
+    sender, receiver = make_link(1, beacon_s=0.0), make_link(2, beacon_s=0.0)
+    bursts = []
+    for number in range(3):
+        sender.submit(0, bytes(8), 0.1 * number)
+        bursts.append(compose(sender, 0.1 * number).pdus)
+    for at, pdus in (0.0, bursts[0]), (0.2, bursts[2]), (0.3, bursts[1]):
+        heard = [message for pdu in pdus for message in receiver.hear(pdu, at)]
+    assert [receiver.delivered(message, 0.3) for message in heard] == [pytest.approx(0.3)]
 
 
 @law(60)

@@ -182,12 +182,15 @@ def next_burst(link, now):
     return link.next_burst(Opportunity(now, airtime_s, most_pdus))
 
 
-def tell(link, src, *records, at):
-    """Make `link` hear a PDU of robot `src` with only `records`; a BEACON by default."""
+def tell(link, src, *records, at, number=None):
+    """Make `link` hear a PDU of robot `src` with only `records`; a BEACON by default.
+
+    Without a `number`, it has one that no other test used, which may look like a late one.
+    """
     builder = PduBuilder(link.params.pdu_size)
     for record in records or (Beacon(src, 0),):
         assert builder.add_record(build_records([record]))
-    number = next(NUMBERS)
+    number = next(NUMBERS) if number is None else number
     pdu = builder.build(flags(0), src, BROADCAST, number & 0xFF, link.params.hop_limit, number >> 8)
     link.hear(pdu, at)
 

@@ -54,7 +54,8 @@ class SequenceTrack:
         self.restarts = 0
         """How often the source seems to have restarted."""
         # By number: what distinguishes the PDU from others with its sequence number, when it came,
-        # and the earliest time at which it may have come first; in the order of arrival.
+        # and the earliest time at which it may have come first, −inf if a relay brought it, which
+        # had it for a time that it does not tell; in the order of arrival.
         self._seen: dict[int, tuple[int, float, float]] = {}
         self._order: deque[int] = deque()
         self._told_at = self._newest_at = -inf
@@ -88,6 +89,8 @@ class SequenceTrack:
         sequence number has.
         """
         self.skipped, self.fills = NOTHING, False
+        if first_at is None and forwarded is not None:
+            first_at = -inf
         if self._order:
             self._forget(at)
             reach = WINDOW if forwarded is None and not is_sealed else inf
@@ -95,7 +98,7 @@ class SequenceTrack:
             if self._is_known(seq, crc, reach):
                 return False
         if self.newest < 0:
-            self._begin(seq if told is None else told, crc, at, is_told=told is not None)
+            self._begin(seq if told is None else told, crc, at, first_at, is_told=told is not None)
             return True
         number = self._placed(seq, at, forwarded)
         if told is not None:
@@ -117,14 +120,14 @@ class SequenceTrack:
         elif number in self._seen or (
             told is None and forwarded is None and not self._may_be_late(number)
         ):
-            self._jump(seq, crc, at)
+            self._jump(seq, crc, at, first_at)
             return True
         else:
             self.fills = True
             self._heard += number > self._anchor
-        self._note(number, crc, at, first_at)
         if forwarded is not None:
             self._reached[forwarded] = max(number, self._reached.get(forwarded, number))
+        self._note(number, crc, at, first_at)
         return True
 
     def lacks(self, told: int) -> bool:
@@ -135,12 +138,13 @@ class SequenceTrack:
     def first_at(self, number: int, at: float) -> float:
         """When PDU `number`, which came at `at`, may have been sent first: that of the PDU before.
 
-        −inf: none of the 128 before it was heard. A burst with a newer PDU brings no older ones.
+        −inf: none of the 128 before it was heard from the source itself. A burst with a newer PDU
+        brings no older ones.
         """
         if at == self._newest_at or number == self.newest:
             return at
         for each in range(number - 1, number - WINDOW, -1):
-            if each in self._seen:
+            if each in self._seen and self._seen[each][2] > -inf:
                 return self._seen[each][2]
         return -inf
 
@@ -164,7 +168,9 @@ class SequenceTrack:
         """Note that nothing is known of the times of other PDUs in the latest burst."""
         self._newest_at = -inf
 
-    def _begin(self, number: int, crc: int, at: float, *, is_told: bool) -> None:
+    def _begin(
+        self, number: int, crc: int, at: float, first_at: float | None = None, *, is_told: bool
+    ) -> None:
         self.newest = self._anchor = number
         self.is_numbered = is_told
         self._told_at = at
@@ -172,16 +178,16 @@ class SequenceTrack:
         self._reached.clear()
         self._seen.clear()
         self._order.clear()
-        self._note(number, crc, at)
+        self._note(number, crc, at, first_at)
 
-    def _jump(self, seq: int, crc: int, at: float) -> None:
+    def _jump(self, seq: int, crc: int, at: float, first_at: float | None) -> None:
         """Go on with a number that is in use: the source restarted, or was away for long."""
         ahead = (seq - self.newest) & 0xFF or 256
         self.restarts += not self._doubtful
         self._doubtful += ahead - 1
         self.newest += ahead
         self._heard += 1
-        self._note(self.newest, crc, at)
+        self._note(self.newest, crc, at, first_at)
 
     def _placed(self, seq: int, at: float, forwarded: Qos | None) -> int:
         """The number of a PDU by its sequence number.

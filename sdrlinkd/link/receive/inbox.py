@@ -134,7 +134,7 @@ class Inbox:
             neighbor.count_duplicate()
             return self._drop("rx_dup", events)
         neighbor.count_new(pdu.hop, is_repaired=track.fills and admitted.number is not None)
-        if track.fills and not is_relayed and track.is_numbered:
+        if track.fills and not is_relayed:
             # It may be a repeated PDU whose REPEAT was lost.
             first_at = max(track.first_at(track.number, at), at - OLDEST_S)
             read = self._reader.read(admitted, at - first_at)
