@@ -39,8 +39,10 @@ SLOW_MACHINE = 3.0
 """What a test may cost more in CI, or where more than twice as many processes as cores compute.
 
 What neighbours of a virtual machine, or an old core, cost is measured: see `slowness`."""
+MORE_TRIALS = max(1.0, FACTOR / USUAL)
+"""How many times the trials of `make test` this run makes; it takes as much longer."""
 LIMITS = {"long": Limits(cpu_s=3600, idle_s=900, wall_s=7200)}
-USUAL_LIMITS = Limits(cpu_s=120, idle_s=90, wall_s=600)
+USUAL_LIMITS = Limits(cpu_s=120 * MORE_TRIALS, idle_s=90, wall_s=600 * MORE_TRIALS)
 TABLE = Path(__file__).parents[1] / "CONTRIBUTING.md"
 DEAREST = 10
 SLOW = 1.5
@@ -205,7 +207,7 @@ def _is_alone(item: pytest.Item) -> bool:
 def allowance() -> float:
     """How many times the limits of the tiers an item may cost in this run, on a usual core."""
     is_busy = "CI" in os.environ or os.getloadavg()[0] > 2 * (os.cpu_count() or 1)
-    return max(1.0, FACTOR / USUAL) * (SLOW_MACHINE if is_busy else 1.0)
+    return MORE_TRIALS * (SLOW_MACHINE if is_busy else 1.0)
 
 
 def too_dear(cost: Cost, allowed: float) -> str:

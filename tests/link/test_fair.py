@@ -77,8 +77,9 @@ class Air:
         )
         if burst is None:
             return False
-        self.now = max(self.now, burst.start) + len(burst.pdus) * PDU_S
+        self.now = max(self.now, burst.start)
         for data, carried in zip(burst.pdus, burst.carried, strict=True):
+            self.now += PDU_S
             for message in carried:
                 self.done_at[struct.unpack_from("<I", message.payload)[0]] = self.now
             entries = numbered(parse(data, PDU_SIZE)).entries
@@ -162,7 +163,7 @@ def test_a_topic_below_its_share_waits_for_no_more_than_its_bound(n, seed):
     others = [(i, rng.choice((20, 150, 400, 3000, 9000))) for i in range(1, n)]
     due = {i: rng.random() * period_s for i in range(n)}
     number, came_at, waited = 1, {}, []
-    while len(came_at) < 5:
+    while len(came_at) < 3:
         for i, other in others:
             # Each offers more than its share, or now and then a whole heap.
             while due[i] <= air.now:
