@@ -687,6 +687,9 @@ def test_a_relay_does_not_tell_when_a_pdu_was_sent_first(newer):
     relayed.heard(10, 0, 1.0, forwarded=Qos.BULK)
     relayed.heard(12, 0, 2.0)
     assert relayed.first_at(11, 4.0) == -inf
+    relayed.restart(50, 0, 5.0, is_forwarded=True)
+    relayed.heard(52, 0, 6.0)
+    assert relayed.first_at(51, 7.0) == -inf
 
 
 def test_repeats_of_a_source_whose_numbers_are_not_known_are_no_younger_for_it():

@@ -54,8 +54,8 @@ class SequenceTrack:
         self.restarts = 0
         """How often the source seems to have restarted."""
         # By number: what distinguishes the PDU from others with its sequence number, when it came,
-        # and the earliest time at which it may have come first, −inf if a relay brought it, which
-        # had it for a time that it does not tell; in the order of arrival.
+        # and the earliest time at which it may have come first; in the order of arrival. That time
+        # is −inf if a relay brought the PDU, as relays do not tell how long they had it.
         self._seen: dict[int, tuple[int, float, float]] = {}
         self._order: deque[int] = deque()
         self._told_at = self._newest_at = -inf
@@ -125,9 +125,9 @@ class SequenceTrack:
         else:
             self.fills = True
             self._heard += number > self._anchor
+        self._note(number, crc, at, first_at)
         if forwarded is not None:
             self._reached[forwarded] = max(number, self._reached.get(forwarded, number))
-        self._note(number, crc, at, first_at)
         return True
 
     def lacks(self, told: int) -> bool:
@@ -144,19 +144,24 @@ class SequenceTrack:
         if at == self._newest_at or number == self.newest:
             return at
         for each in range(number - 1, number - WINDOW, -1):
-            if each in self._seen and self._seen[each][2] > -inf:
-                return self._seen[each][2]
+            known = self._seen.get(each)
+            if known is not None and known[2] > -inf:
+                return known[2]
         return -inf
 
     def goes_on(self) -> None:
         """Note that the source has not restarted so far: all steps ahead were losses."""
         self._leap = 0
 
-    def restart(self, seq: int, crc: int, at: float = 0.0, told: int | None = None) -> None:
+    def restart(
+        self, seq: int, crc: int, at: float = 0.0, told: int | None = None, *,
+        is_forwarded: bool = False,
+    ) -> None:  # fmt: skip
         """Start over with a source that counts from a new number, and forget what was heard."""
         self.restarts += not self._doubtful
         self._settled = max(0, self.lost - self._leap)
-        self._begin(seq if told is None else told, crc, at, is_told=told is not None)
+        first_at = -inf if is_forwarded else None
+        self._begin(seq if told is None else told, crc, at, first_at, is_told=told is not None)
 
     def begin_anew(self) -> None:
         """Go on with another clock; what was heard lately is forgotten."""
@@ -169,7 +174,7 @@ class SequenceTrack:
         self._newest_at = -inf
 
     def _begin(
-        self, number: int, crc: int, at: float, first_at: float | None = None, *, is_told: bool
+        self, number: int, crc: int, at: float, first_at: float | None, *, is_told: bool
     ) -> None:
         self.newest = self._anchor = number
         self.is_numbered = is_told

@@ -209,7 +209,7 @@ class Inbox:
             if boot_id == neighbor.boot_id:
                 neighbor.track.goes_on()
             return
-        neighbor.track.restart(*key[1:], at, read.told)
+        neighbor.track.restart(*key[1:], at, read.told, is_forwarded=read.is_forwarded)
         self._forget(neighbor.src, now, events)
         self._announce(neighbor.src, at, events)
 
