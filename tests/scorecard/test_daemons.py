@@ -120,14 +120,21 @@ def test_row_4_a_consumer_is_frozen(start_daemon, lasting, figure):
     figure(4, "a frozen consumer beside a healthy one", f"{n} of {n}, memory {grown:+.1f} MiB")
 
 
-def test_row_13_the_clock_steps(start_daemon, lasting, figure):
+def test_row_13_the_clock_steps(start_daemon, lasting, figure, tmp_path):
+    """The daemon's clock alone steps, and the programs' do not."""
+    begun = tmp_path / "begun"
     stepping = (
-        "import time; real = time.time; began = real(); "
-        "time.time = lambda: real() + (0, 3600, -3600, 0.2, -0.2)[int(4 * (real() - began)) % 5]; "
+        f"import os, time; real = time.time; begun = {str(begun)!r}; "
+        "since = lambda: real() - os.path.getmtime(begun) if os.path.exists(begun) else 0; "
+        "time.time = lambda: real() + (0, 3600, -3600, 0.2, -0.2)[int(4 * since()) % 5]; "
         "time.time_ns = lambda: int(1e9 * time.time());"
     )
-    daemon, n = start_daemon("", stepping), 0
+    daemon, n = start_daemon("", stepping), 1
     with Counting(daemon.directory) as heard, Publisher(daemon.directory) as out:
+        # With a message, the daemon looks at the clock.
+        out.send("/robot_1/odom", CDR + bytes(100))
+        wait_for(lambda: heard.count == n)
+        begun.touch()
         cpu, began = cpu_s(daemon), time.monotonic()
         for _ in lasting():
             out.send("/robot_1/odom", CDR + bytes(100))

@@ -105,7 +105,7 @@ def test_a_policy_is_changed_by_mouse(lab, open_browser):
     rows = browser.see(lambda: [r for r in browser.all("tbody tr") if topic in r.text], "row")
     rows[0].click()
     browser.see(lambda: "Policy, until the next restart" in browser.text, "policy")
-    browser.see(lambda: "class latency" in browser.text, "its class")
+    browser.see(lambda: "odom: class default" in browser.text, "its class")
 
     def policy():
         with ControlClient(lab[1] / "robot_1") as control:
