@@ -22,6 +22,11 @@ class BurstQuality(NamedTuple):
     cfo: float
     """Frequency offset in cycles per sample."""
 
+    @property
+    def noise(self) -> float:
+        """Power of the noise beside the burst, or up to twice that."""
+        return 10 ** (self.rssi_dbfs / 10) / (1 + 10 ** (self.snr_db / 10))
+
 
 class PduHeard(NamedTuple):
     """PDU `number` of a burst, with a correct CRC-32; `at` is the index after its last sample."""

@@ -128,8 +128,11 @@ class Receiver:
         """End the stream; returns the events in its last samples, as if silence followed."""
         n = self._grid.n_symbol + HOP + ALIGN_SPAN + needed_after(self._grid)
         samples, self._began = self.counters["samples"], self._stream.end + n
+        known = self._memory.content.state.copy()
         events = self.push(np.zeros(n, np.complex64))
         self.counters["samples"] = samples
+        # Silence that nobody received tells nothing of the noise.
+        self._memory.content.state[:] = known
         if self._burst is not None:
             self._end(self._burst, events, "cut")
             self._go(Found.CUT)
@@ -211,6 +214,7 @@ class Receiver:
             else:
                 self._pass_by(peak, "headers_bad", Found.BAD_HEADER)
             return True
+        self._memory.content.heard(found.quality.noise)
         told = found.header
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
         if self._screening.refuses(told, plan):

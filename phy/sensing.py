@@ -11,6 +11,7 @@ from phy.stream import LARGEST_SAMPLE
 from phy.tables.sensing import (
     BUSY_UNTIL,
     CARRIER_UNTIL,
+    EXPLAINED_UNTIL,
     FILLED,
     FLOOR,
     LEAST_FLOOR,
@@ -24,25 +25,32 @@ from phy.tables.sensing import (
     SHORT,
 )
 
+PATIENCE = 40_000
+"""Samples of energy without a burst that become noise: 40 ms at 1 Msps."""
+
 
 class EnergyDetector:
     """Detects energy above the noise floor, in windows of WINDOW samples.
 
     The floor starts as the first window's power and follows quiet windows (at once to a power below
-    half, otherwise by 1/64 of the difference). It doubles in 2^17 busy windows, so that a permanent
-    signal becomes noise. Windows are contiguous from `start` on.
+    half, otherwise by 1/64 of the difference). Windows are contiguous from `start` on.
 
     Busy windows with at most three quiet ones in between are a run. A run as short as a pulse of
     energy may be one; a longer one is a carrier.
+
+    What misleads the floor: samples without noise (a muted or starting radio), a gain that rises, a
+    foreign signal that stays. The way back: a run of `patience` samples that no burst explains
+    becomes the floor; and a window with less than half of the floor is the new floor.
     """
 
-    def __init__(self, threshold_db: float = 6.0, start: int = 0) -> None:
+    def __init__(self, threshold_db: float = 6.0, start: int = 0, patience: int = PATIENCE) -> None:
         if not 0 < threshold_db < math.inf:
             raise ValueError(f"threshold in dB: got {threshold_db}; allowed: more than 0")
         self.threshold_db = threshold_db
         self._threshold = 10 ** (threshold_db / 10)
+        self._patience = patience
         self._state = np.zeros(N_STATE)
-        self._state[[BUSY_UNTIL, NEXT, RUN_FROM, CARRIER_UNTIL]] = start
+        self._state[[BUSY_UNTIL, NEXT, RUN_FROM, CARRIER_UNTIL, EXPLAINED_UNTIL]] = start
 
     @property
     def next_index(self) -> int:
@@ -87,7 +95,11 @@ class EnergyDetector:
     def push(self, samples: NDArray[np.complex64]) -> None:
         """Take the next samples `[n]`, complex64, and judge the windows that they complete."""
         x = np.ascontiguousarray(samples, np.complex64)
-        compute.sense(x, self._threshold, LARGEST_SAMPLE, self._state)
+        compute.sense(x, self._threshold, LARGEST_SAMPLE, self._patience, self._state)
+
+    def explain(self, until: int) -> None:
+        """Note that a burst explains the energy before the absolute index `until`."""
+        self._state[EXPLAINED_UNTIL] = max(self._state[EXPLAINED_UNTIL], until)
 
     def gap(self, n: int) -> None:
         """Note that `n` samples are missing: the floor is kept, an incomplete window dropped.

@@ -25,8 +25,29 @@ from phy.sequences import polarity, whitening
 from phy.sizes import N_LANES, NOISE_CHUNK
 from phy.stream import SampleStream
 from phy.tables.block import FIELDS, ArgumentBlock, block_of
-from phy.tables.burst import DELAY, DRIFT, GAIN, NO, PHASE, SLOPE, SLOPE_USED
-from phy.tables.detector import DC_IMAG, DC_REAL, FLOOR, FORGETS, HISTORY, new_search_memory
+from phy.tables.burst import (
+    DELAY,
+    DOUBT,
+    DRIFT,
+    DUE,
+    GAIN,
+    NO,
+    PHASE,
+    SCALED,
+    SLOPE,
+    SLOPE_USED,
+    SPREAD,
+)
+from phy.tables.detector import (
+    DC_IMAG,
+    DC_REAL,
+    FLOOR,
+    FORGETS,
+    HISTORY,
+    PATIENCE,
+    SURE,
+    new_search_memory,
+)
 from phy.transmitter import header_samples
 
 __all__ = [  # noqa: RUF022 (by stage)
@@ -60,18 +81,24 @@ __all__ = [  # noqa: RUF022 (by stage)
     "FLOOR",
     "FORGETS",
     "HISTORY",
+    "PATIENCE",
+    "SURE",
     "Acquisition",
     "Missed",
     "SampleStream",
     "new_search_memory",
     # What is known of a burst's channel.
     "DELAY",
+    "DOUBT",
     "DRIFT",
+    "DUE",
     "GAIN",
     "NO",
     "PHASE",
     "SLOPE",
+    "SCALED",
     "SLOPE_USED",
+    "SPREAD",
     "in_planes",
     "new_channel",
     "new_scratch",

@@ -3,7 +3,8 @@
 There is no running sum from sample to sample, so nothing drifts, every loop is vectorised, and the
 result does not depend on how the stream was cut into chunks.
 
-Almost all hops of a quiet air have no more power than noise has. The metric is not computed there.
+Almost all hops of a quiet air have no more power than noise has. The metric is not computed there,
+once as many of them have been searched in vain. So a search that begins within a burst stays open.
 """
 
 import math
@@ -17,20 +18,30 @@ from phy.kernels.lanes import Lanes, load, pairs, splat, total
 from phy.kernels.openers import open_search
 from phy.sizes import N_LANES
 from phy.tables.block import PackedArguments
-from phy.tables.detector import DC_IMAG, DC_REAL, FLOOR, FORGETS, HISTORY, HOPS, SEGMENT, SHORT
+from phy.tables.detector import (
+    ABOVE,
+    DC_IMAG,
+    DC_REAL,
+    FLOOR,
+    FORGETS,
+    HISTORY,
+    HOPS,
+    LOWER,
+    PATIENCE,
+    SEGMENT,
+    SHORT,
+    SURE,
+)
 
 GATE = 1.15
 """A half of a hop with more power than this times the noise is searched."""
-DOUBLING = 4096
-"""A permanent signal becomes noise: the floor doubles in this many hops above it."""
 _WEIGHT = 1 / 64
-_CREEP = 2 ** (1 / DOUBLING)
 
 # E is over 192 samples, P over the 176 products of samples 16 apart.
 _SHARE = np.float32((SHORT - SEGMENT) / SHORT)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def detector_sums(x: NDArray[np.complex64], dc: complex, work: NDArray[np.float32], n: int) -> None:
     """P (rows 0, 1: real, imaginary) and E (row 2) of the `n` samples after HISTORY of `x`.
 
@@ -98,7 +109,7 @@ def _despread(q: NDArray[np.float32], out: NDArray[np.float32], n: int) -> None:
         )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def search(
     x: NDArray[np.complex64],
     n_hops: int,
@@ -120,26 +131,38 @@ def search(
     for h in range(n_hops):
         begin = h * hop
         early, late, mean = _halves(x, begin + HISTORY, hop, state, work)
-        power, floor = (early + late) / 2, state[FLOOR]
-        is_open = max(early, late) > GATE * floor
-        if is_open:
+        is_above = max(early, late) > GATE * state[FLOOR]
+        if is_above or state[SURE] < PATIENCE:
             level = threshold + excess * math.exp(-(age + h * hop) / FORGETS)
             found = _crossing(x[begin : begin + HISTORY + hop], hop, level, state, work)
             if found >= 0:
                 return begin + found
-        if floor == 0 or power < floor / 2:
-            floor = power
-        elif is_open:
-            floor *= _CREEP
-        else:
-            floor += _WEIGHT * (power - floor)
-        state[FLOOR] = floor
+        power = (early + late) / 2
+        if power < LOWER * state[FLOOR] or abs(mean) ** 2 > power / 2:
+            # A strong signal has ended, and its mean was no DC; or the DC has jumped.
+            state[HOPS] = 0
+        _follow_noise(power, is_above, state)
         state[HOPS] += 1
         # At first the mean of all hops, for quick settling; later of about the last 64.
         weight = max(_WEIGHT, 1 / state[HOPS])
         state[DC_REAL] += weight * mean.real
         state[DC_IMAG] += weight * mean.imag
     return -1
+
+
+@step
+def _follow_noise(power: float, is_above: bool, state: NDArray[np.float64]) -> None:
+    """Learn from a hop without a crossing what power noise has."""
+    if state[FLOOR] == 0 or power < LOWER * state[FLOOR]:
+        state[FLOOR], state[SURE], state[ABOVE] = power, 0, 0
+    elif not is_above:
+        state[FLOOR] += _WEIGHT * (power - state[FLOOR])
+        state[SURE], state[ABOVE] = min(state[SURE] + 1, PATIENCE), 0
+    elif state[ABOVE] < PATIENCE:
+        state[ABOVE] += 1
+    else:
+        # A permanent signal is noise.
+        state[FLOOR], state[SURE], state[ABOVE] = power, PATIENCE, 0
 
 
 @step
@@ -194,7 +217,7 @@ def _halves(
     return total(early) / half, total(late) / half, complex(pairs(sums)) / hop
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def strongest(
     x: NDArray[np.complex64], n: int, memory_in: PackedArguments
 ) -> tuple[int, complex, float]:
@@ -211,8 +234,9 @@ def strongest(
     best, best_metric = 0, -1.0
     for i in range(n):
         if energy[i] > 0:
-            power = float(p_re[i]) * p_re[i] + float(p_im[i]) * p_im[i]
-            metric = power / (float(energy[i]) * energy[i])
+            # In double precision: the square of a small float32 is 0.
+            re, im, e = np.float64(p_re[i]), np.float64(p_im[i]), np.float64(energy[i])
+            metric = (re * re + im * im) / (e * e)
             if metric > best_metric:
                 best, best_metric = i, metric
     p = complex(p_re[best], p_im[best])
@@ -225,7 +249,7 @@ def strongest(
     return best, p, abs(plain) / abs(p)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def sanitise(x: NDArray[np.complex64], limit: float) -> int:
     """Set samples that are not finite or exceed `limit` to 0; returns their number."""
     most, n_good = np.float32(limit), 0

@@ -13,7 +13,11 @@ def step(function: _Step) -> _Step:
 
     Passing a tuple of arrays by value would cost more than many steps do.
     """
-    options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    options: dict[str, Any] = {
+        "no_cpython_wrapper": True,
+        "no_cfunc_wrapper": True,
+        "error_model": "numpy",
+    }
     made: Any = njit(nogil=True, forceinline=True, **options)(function)
     inlined: _Step = made
     return inlined

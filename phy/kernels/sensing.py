@@ -13,6 +13,7 @@ from phy.tables.sensing import (
     APART,
     BUSY_UNTIL,
     CARRIER_UNTIL,
+    EXPLAINED_UNTIL,
     FILLED,
     FLOOR,
     LEAST_FLOOR,
@@ -26,19 +27,21 @@ from phy.tables.sensing import (
     SHORT,
 )
 
-# A permanent signal becomes noise: the floor doubles in this many busy windows.
-DOUBLING = 1 << 17
-_CREEP = 2 ** (1 / DOUBLING)
 _WEIGHT = 1 / 64
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def sense(
-    x: NDArray[np.complex64], threshold: float, limit: float, state: NDArray[np.float64]
+    x: NDArray[np.complex64],
+    threshold: float,
+    limit: float,
+    patience: float,
+    state: NDArray[np.float64],
 ) -> None:
     """Process samples `[n]`: a window is busy when its mean power exceeds `threshold` · floor.
 
-    Bad samples, which are not finite or exceed `limit`, count as no power.
+    Energy without a pause and without a known burst becomes the floor after `patience` samples. Bad
+    samples, which are not finite or exceed `limit`, count as no power.
     """
     powers = state[POWERS:]
     filled = int(state[FILLED])
@@ -51,17 +54,18 @@ def sense(
         at += n
         filled += n
         if filled == WINDOW:
-            _judge(powers, threshold, limit * limit, state[NEXT] + at, state)
+            _judge(powers, threshold, limit * limit, patience, state[NEXT] + at, state)
             filled = 0
     state[FILLED] = filled
     state[NEXT] += x.size
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _judge(
     powers: NDArray[np.float64],
     threshold: float,
     limit: float,
+    patience: float,
     end: float,
     state: NDArray[np.float64],
 ) -> None:
@@ -76,7 +80,8 @@ def _judge(
     busy = floor > 0 and power > threshold * floor
     if busy:
         _note_energy(end, state)
-        floor *= _CREEP
+        if end - max(state[RUN_FROM], state[EXPLAINED_UNTIL]) > patience:
+            floor = power
     elif spoilt:
         # The window's power is too low by an unknown amount; too low a floor would make all noise
         # busy.
@@ -88,7 +93,7 @@ def _judge(
     state[FLOOR] = max(floor, LEAST_FLOOR)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _note_energy(end: float, state: NDArray[np.float64]) -> None:
     """Note a busy window that ends at index `end`: its run goes on, or a new one begins."""
     last = state[BUSY_UNTIL]
@@ -103,7 +108,7 @@ def _note_energy(end: float, state: NDArray[np.float64]) -> None:
         state[CARRIER_UNTIL] = end
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _mean(powers: NDArray[np.float64]) -> float:
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     for i in range(0, WINDOW, 4):
@@ -114,7 +119,7 @@ def _mean(powers: NDArray[np.float64]) -> float:
     return ((a + b) + (c + d)) / WINDOW
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _without_bad(powers: NDArray[np.float64], limit: float) -> int:
     """Set powers that are not finite or exceed `limit` to 0; returns their number."""
     bad = 0

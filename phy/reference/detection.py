@@ -32,8 +32,10 @@ SLOWEST = 1 / 64
 """Least weight of each hop's mean in the DC, and of its power in that of the noise."""
 GATE = 1.15
 """A half of a hop with more power than this times the noise is searched."""
-CREEP = 2 ** (1 / 4096)
-"""Factor by which the noise grows in each hop above it: a permanent signal becomes noise."""
+PATIENCE = 4096
+"""A power is that of noise once so many hops were searched in vain."""
+LOWER = 0.7
+"""A hop, or the noise of a burst, with less than this share of the noise: it was not noise."""
 
 
 def sums(x: NDArray[np.complexfloating], dc: complex) -> tuple[Samples, NDArray[np.float64]]:
@@ -61,12 +63,19 @@ def _neighbors(x: NDArray[np.complexfloating], dc: complex) -> Samples:
 
 
 class Detector:
-    """Detects preambles; keeps DC, noise, and the threshold raised by false alarms."""
+    """Detects preambles; keeps DC, noise, and the threshold raised by false alarms.
+
+    What misleads `noise`: a search that begins within a burst, a foreign signal that stays or ends,
+    another gain. Too low, it costs only time: all is searched, and after PATIENCE hops it is right.
+    It cannot be too high for longer than a hop: noise shows as soon as nobody sends, and each burst
+    that is read tells its noise.
+    """
 
     def __init__(self, start: int) -> None:
         self.dc = 0j
         self.noise = 0.0
         """Power of the hops without a burst; 0: unknown."""
+        self._n_sure = self._n_above = 0
         self._hops_seen = 0
         self._excess, self._raised_at = 0.0, start
 
@@ -79,25 +88,39 @@ class Detector:
         """
         y = x[HISTORY:].astype(np.complex128) - self.dc
         halves = (np.abs(y) ** 2).reshape(2, -1).mean(axis=1)
-        is_open = bool(halves.max() > GATE * self.noise)
-        if is_open:
+        is_above = bool(halves.max() > GATE * self.noise)
+        if is_above or self._n_sure < PATIENCE:
             level = THRESHOLD + self._excess_at(at)
             p, e = sums(x, self.dc)
             over = np.abs(p) ** 2 > level**2 * e**2
             if over.any():
                 return at + int(over.argmax())
-        self._follow_noise(float(halves.mean()), is_open)
+        power, mean = float(halves.mean()), complex(y.mean())
+        if power < LOWER * self.noise or abs(mean) ** 2 > power / 2:
+            # A strong signal has ended, and its mean was no DC; or the DC has jumped.
+            self._hops_seen = 0
+        self._follow_noise(power, is_above)
         self._hops_seen += 1
-        self.dc += max(SLOWEST, 1 / self._hops_seen) * complex(y.mean())
+        self.dc += max(SLOWEST, 1 / self._hops_seen) * mean
         return None
 
-    def _follow_noise(self, power: float, is_open: bool) -> None:
-        if self.noise == 0 or power < self.noise / 2:
-            self.noise = power
-        elif is_open:
-            self.noise *= CREEP
-        else:
+    def heard(self, noise: float) -> None:
+        """Note a burst that was read beside `noise`: signals are on the air, and no more noise."""
+        self._n_above = 0
+        if noise < LOWER * self.noise:
+            self._n_sure = 0
+
+    def _follow_noise(self, power: float, is_above: bool) -> None:
+        if self.noise == 0 or power < LOWER * self.noise:
+            self.noise, self._n_sure, self._n_above = power, 0, 0
+        elif not is_above:
             self.noise += SLOWEST * (power - self.noise)
+            self._n_sure, self._n_above = min(self._n_sure + 1, PATIENCE), 0
+        elif self._n_above < PATIENCE:
+            self._n_above += 1
+        else:
+            # A permanent signal is noise.
+            self.noise, self._n_sure, self._n_above = power, PATIENCE, 0
 
     def strongest(self, x: NDArray[np.complexfloating]) -> tuple[int, float | None]:
         """Find the largest |P| / E after 191 samples of `x`; returns (its offset, frequency).

@@ -14,6 +14,7 @@ from phy.tables.sensing import (
     APART,
     BUSY_UNTIL,
     CARRIER_UNTIL,
+    EXPLAINED_UNTIL,
     FILLED,
     FLOOR,
     LEAST_FLOOR,
@@ -27,8 +28,6 @@ from phy.tables.sensing import (
     SHORT,
 )
 
-DOUBLING = 1 << 17
-"""A permanent signal becomes noise: the floor doubles in this many busy windows."""
 AT_ONCE = 4096
 """Number of samples interpolated at once, to limit memory."""
 _64_BITS = (1 << 64) - 1
@@ -114,9 +113,16 @@ def filter_strided(
 
 
 def sense(
-    x: NDArray[np.complex64], threshold: float, limit: float, state: NDArray[np.float64]
+    x: NDArray[np.complex64],
+    threshold: float,
+    limit: float,
+    patience: float,
+    state: NDArray[np.float64],
 ) -> None:
-    """Judge windows: busy with more mean power than `threshold` · floor, else the floor follows."""
+    """Judge windows: busy with more mean power than `threshold` · floor, else the floor follows.
+
+    Energy without a pause and without a known burst becomes the floor after `patience` samples.
+    """
     filled, end = int(state[FILLED]), state[NEXT]
     with np.errstate(over="ignore", invalid="ignore"):
         powers = (x.real**2 + x.imag**2).astype(np.float64)
@@ -137,7 +143,8 @@ def sense(
             busy_until = window_at + SENSE_WINDOW
             if busy_until - state[RUN_FROM] > MOST_PULSE:
                 state[CARRIER_UNTIL] = busy_until
-            floor *= 2 ** (1 / DOUBLING)
+            if busy_until - max(state[RUN_FROM], state[EXPLAINED_UNTIL]) > patience:
+                floor = power
         elif is_whole and (floor == 0 or power < floor / 2):
             floor = max(power, LEAST_FLOOR)
         elif is_whole:

@@ -6,6 +6,7 @@ sample never depends on how many came with it: any chunking yields the same even
 
 from collections import Counter
 from collections.abc import Callable
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,8 +117,11 @@ class Receiver:
         """End the stream; returns the events in its last samples, as if silence followed."""
         n = self._grid.n_symbol + HOP + ALIGN_SPAN + needed_after(self._grid)
         counted, self._began = self.counters["samples"], self.next_index + n
+        known = copy(self._detector)
         events = self.push(np.zeros(n, np.complex64))
         self.counters["samples"] = counted
+        # Silence that nobody received tells nothing of the noise.
+        self._detector = known
         if self._burst is not None:
             self._end(self._burst, events, "cut")
         return events
@@ -197,6 +201,7 @@ class Receiver:
             else:
                 self._pass_by(peak, "headers_bad")
             return True
+        self._detector.heard(found.quality.noise)
         told = found.header
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
         if self._screening.refuses(told, plan):

@@ -15,9 +15,16 @@ HISTORY = SHORT - 1
 FORGETS = 4096.0
 """Number of samples in which a raised threshold decays by a factor of e."""
 
-# Content of the state of the search: DC, number of hops, and the power of the noise; 0: unknown.
-DC_REAL, DC_IMAG, HOPS, FLOOR = range(4)
-N_STATE = 4
+# Content of the state of the search: DC; number of hops; the power that noise seems to have (0:
+# unknown); how many hops with that power were searched in vain, up to PATIENCE; and how many with
+# more power were, one after another.
+DC_REAL, DC_IMAG, HOPS, FLOOR, SURE, ABOVE = range(6)
+N_STATE = 6
+
+PATIENCE = 4096
+"""A power is that of noise once so many hops were searched in vain."""
+LOWER = 0.7
+"""A hop, or the noise of a burst, with less than this share of the floor: it was not noise."""
 
 
 @block_of("f8[1] f4[2]")
@@ -25,7 +32,7 @@ class SearchMemory(NamedTuple):
     """What the search keeps from call to call, and its working memory."""
 
     state: NDArray[np.float64]
-    """Estimates of DC and noise `[N_STATE]`."""
+    """DC, and what is known of the noise `[N_STATE]`."""
     work: NDArray[np.float32]
     """Room for the sums of as many samples as are searched at once `[7, HISTORY + n]`."""
 
@@ -33,6 +40,12 @@ class SearchMemory(NamedTuple):
     def dc(self) -> complex:
         """The DC that a search has estimated."""
         return complex(self.state[DC_REAL], self.state[DC_IMAG])
+
+    def heard(self, noise: float) -> None:
+        """Note a burst that was read beside `noise`: signals are on the air, and no more noise."""
+        self.state[ABOVE] = 0
+        if noise < LOWER * self.state[FLOOR]:
+            self.state[SURE] = 0
 
 
 def new_search_memory(hop: int) -> ArgumentBlock[SearchMemory]:

@@ -174,6 +174,21 @@ def test_energy_that_goes_on_behind_a_burst_is_another_carrier():
     assert abs(sensed.idle_since * RATE - end - more) < COARSE
 
 
+def test_bursts_without_a_pause_stay_busy_and_a_jammer_does_not():
+    """Headers explain the energy of the bursts, for longer than the patience; nothing else does."""
+    bursts = [part for seed in range(9) for part in (a_burst(seed), 32)]
+    n = sum(each if isinstance(each, int) else len(each) for each in bursts)
+    assert n > 1.5 * 40_000
+    receiving = make_receiving()
+    story = listen(receiving, on_air(QUIET, *bursts), 500)
+    told = [is_busy(sensed) for now, sensed, _ in story if QUIET + TAIL < now < QUIET + n - TAIL]
+    # The tail of a burst counts as its echo.
+    assert np.mean(told) > 0.9
+    story = listen(receiving, on_air(no_burst(1, 60_000)), 500, QUIET + n)
+    quiet_at = max(now for now, sensed, _ in story if is_busy(sensed)) - QUIET - n
+    assert 0.9 * 40_000 < quiet_at < 1.1 * 40_000
+
+
 def test_a_burst_behind_another_is_the_last_one():
     first, second = a_burst(7), a_burst(8, n_pdus=2)
     pause = 3 * WINDOW

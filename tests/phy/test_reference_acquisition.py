@@ -36,7 +36,7 @@ def planes_of(x):
 def searched(x, at, excess=0.0, dc=0j, n_seen=0):
     """(index of the first crossing or None, DC, hops seen) by the kernel, hop by hop."""
     memory = new_search_memory(512)
-    memory.content.state[:] = dc.real, dc.imag, n_seen, 0.0
+    memory.content.state[:4] = dc.real, dc.imag, n_seen, 0.0
     n_hops = (len(x) - 191) // 512
     found = compute.search(x, n_hops, 512, detection.THRESHOLD, excess, 0, memory)
     return (at - 191 + found if found >= 0 else None), memory.content.dc

@@ -13,8 +13,8 @@ from tests.laws import law
 from tests.phy.signals import noise, noisy, payloads, silence, turned
 
 SEED = 53
-# In so many busy windows the floor doubles, and it never falls below -120 dBFS.
-DOUBLING, LEAST_FLOOR = 1 << 17, 1e-12
+# Energy for more samples than this becomes noise; the floor never falls below -120 dBFS.
+PATIENCE, LEAST_FLOOR = 40_000, 1e-12
 
 
 def rng(seed=SEED):
@@ -45,15 +45,18 @@ def busy_windows(sense, samples):
 
 def plainly(samples, threshold_db=6.0):
     """(ends of busy windows, floor) by the formula, term by term; no sample is bad."""
-    floor, ends = None, []
+    floor, ends, run_from = None, [], 0
     windows = len(samples) // WINDOW
     powers = np.abs(samples[: windows * WINDOW].astype(np.complex128)) ** 2
     for k, p in enumerate(powers.reshape(windows, WINDOW).mean(axis=1)):
         if floor is None:
             floor = p
         elif p > floor * 10 ** (threshold_db / 10):
+            if k * WINDOW >= (ends[-1] if ends else 0) + 4 * WINDOW:
+                run_from = k * WINDOW
             ends.append((k + 1) * WINDOW)
-            floor *= 2 ** (1 / DOUBLING)
+            if ends[-1] - run_from > PATIENCE:
+                floor = p
         elif p < floor / 2:
             floor = p
         else:
@@ -126,21 +129,38 @@ def test_a_start_within_a_burst_is_over_when_the_burst_is():
     assert abs(ends[-1] - begin - len(second)) < WINDOW
 
 
-def test_a_carrier_that_never_ends_becomes_noise():
-    """Not before 2^16 windows; when it ends, the floor is back at once.
-
-    One doubling is enough for 10 dB: then the first windows fall below the threshold, and pull the
-    floor along.
-    """
+@pytest.mark.parametrize("rise_db", [9, 30, 60])
+@pytest.mark.parametrize("patience", [40_000, 200_000])
+def test_a_carrier_that_never_ends_becomes_noise(rise_db, patience):
+    """In as many samples as were said; when it ends, the floor is back at once."""
     draws = rng()
-    sense = sensed(noise(draws, 6400))
-    subcarrier = noise(draws, WINDOW * DOUBLING // 8, 11.0)
-    n = next(n for n in range(24) if busy_after(sense, subcarrier) < sense.next_index)
-    assert 4 <= n <= 16
-    assert sense.noise_dbfs == pytest.approx(10.4, abs=0.3)
+    sense = sensed(noise(draws, 6400), patience=patience)
+    carrier = noise(draws, patience + 128 * WINDOW, 10 ** (rise_db / 10))
+    last = busy_windows(sense, carrier)[-1] - 6400
+    assert patience < last < patience + 16 * WINDOW
+    assert sense.noise_dbfs == pytest.approx(rise_db, abs=1)
     sense.push(noise(draws, 64 * WINDOW))
     assert sense.noise_dbfs == pytest.approx(0, abs=0.7)
     assert busy_after(sense, 3 * noise(draws, 640)) >= sense.next_index - WINDOW
+
+
+def test_energy_that_a_burst_explains_is_no_noise():
+    """Bursts that follow one another closely are energy for as long as they last."""
+    draws = rng()
+    sense = sensed(noise(draws, 6400))
+    for _ in range(10):
+        sense.explain(sense.next_index + 20_000)
+        assert len(busy_windows(sense, noise(draws, 400 * WINDOW, 100))) == 400
+    sense.explain(0)
+    ends = busy_windows(sense, noise(draws, 1000 * WINDOW, 100))
+    assert PATIENCE - 6400 < ends[-1] - sense.next_index + 1000 * WINDOW < PATIENCE
+
+
+@pytest.mark.parametrize("before", [silence(64_000), 1e-3 * noise(rng(), 64_000)])
+def test_a_radio_that_begins_in_silence_is_busy_for_no_longer_than_the_patience(before):
+    sense = sensed(before)
+    ends = busy_windows(sense, noise(rng(), 2 * PATIENCE))
+    assert PATIENCE < ends[-1] - len(before) < PATIENCE + 16 * WINDOW
 
 
 def busy_after(sense, samples):
@@ -178,16 +198,6 @@ def test_a_stream_that_begins_with_bad_samples_has_no_floor_yet():
     sense.push(noise(rng(), 6400))
     assert sense.busy_until == 0
     assert sense.noise_dbfs == pytest.approx(0, abs=1)
-
-
-def test_after_zeros_any_signal_is_busy_until_the_floor_has_crept_up():
-    """The least floor is -120 dBFS; to a level 10 dB above it takes at least 2^17 windows."""
-    draws = rng()
-    sense = sensed(silence(6400))
-    sense.push(noise(draws, 64_000, 1e-11))
-    assert sense.busy_until == sense.next_index
-    assert sense.noise_dbfs == pytest.approx(-120, abs=0.1)
-    assert busy_after(sense, silence(1)) == 6400 + 64_000
 
 
 @pytest.mark.parametrize("power", [1e-30, 1e-12, 1e12])

@@ -1,6 +1,7 @@
 """A radio, its receiver and its modulator, run by the event loop of this process."""
 
 import asyncio
+import math
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
@@ -23,7 +24,7 @@ from sdrlinkd.modem.clock import BlockTimes, Seen, StreamClock
 from sdrlinkd.modem.modem import BurstOrder, ModemStatus, ModemUser
 from sdrlinkd.modem.process.observer import Observer
 from sdrlinkd.modem.process.receiving import Call, Demodulation, ReceiverHere, ReceiverThread
-from sdrlinkd.modem.process.sensing_receiver import SensingReceiver
+from sdrlinkd.modem.process.sensing_receiver import PATIENCE_S, SensingReceiver
 from sdrlinkd.modem.process.transmission import Transmission
 from sdrlinkd.pdulink import Heard, Observe
 
@@ -144,7 +145,8 @@ class ModemHere:
             centre_cycles=params.centre_hz / params.rate_hz if params.one_crystal else 0.0,
             expected=self._expected(),
         )
-        sense = phy.EnergyDetector(params.carrier_db) if self._listens else None
+        patience = math.ceil(PATIENCE_S * params.rate_hz)
+        sense = phy.EnergyDetector(params.carrier_db, patience=patience) if self._listens else None
         receiving = self._receiving = SensingReceiver(receiver, sense, params.rate_hz)
         self._tx = Transmission(params, self._radio, self._index if can.paced else None)
         if can.lockstep:

@@ -13,6 +13,8 @@ TAIL = 2 * phy.SENSE_WINDOW
 CLEARLY_DB = 3.0
 # ... so after this many samples without energy, it is over, whatever its header said.
 VANISHED = 4 * phy.SENSE_WINDOW
+PATIENCE_S = 0.04
+"""Energy that no header explains becomes noise after this: a robot beside a jammer sends again."""
 
 
 class SensingReceiver:
@@ -42,6 +44,7 @@ class SensingReceiver:
         else:
             events = self._receiver.push(block.samples)
             if self._sense is not None:
+                self._sense.explain(self._receiver.claim.end)
                 self._sense.push(block.samples)
         if self._sense is not None:
             self.sensed = self._sense_air(self._sense)
