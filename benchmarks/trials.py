@@ -19,7 +19,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Air:
-    """The channel between a transmitter and a receiver of bursts of one PDU.
+    """The channel between a transmitter and a receiver of bursts.
 
     The crystals differ by ±40 ppm, which shifts centre frequency and sample rate. The transmitter
     has an image of -36 dB and a leak of -35 dBc. The receiver has an image of -34 dB, DC of -25 dBc
@@ -33,9 +33,9 @@ class Air:
 
 
 def bursts(
-    air: Air, mcs: int, n_bytes: int, snr_db: float, seed: int
-) -> Iterator[tuple[bytes, NDArray[np.complex64]]]:
-    """Endless PDUs with their bursts as a receiver samples them, each after some noise.
+    air: Air, mcs: int, n_bytes: int, snr_db: float, seed: int, n_pdus: int = 1
+) -> Iterator[tuple[list[bytes], NDArray[np.complex64]]]:
+    """Endless bursts: the PDUs of each, and what a receiver samples of it, after some noise.
 
     SNR is the burst's mean power over that of the noise in the sample band. A fading channel is
     drawn anew for each burst; its mean power counts.
@@ -47,7 +47,7 @@ def bursts(
     )
     front_end = FrontEnd(front, rng)
     while True:
-        pdu = rng.bytes(n_bytes)
+        pdus = [rng.bytes(n_bytes) for _ in range(n_pdus)]
         params = PathParams(
             rate_hz=air.rate_hz,
             centre_hz=air.centre_hz,
@@ -59,9 +59,9 @@ def bursts(
             leak_db=35.0,
             phase_noise_dbc_hz=-90.0,
         )
-        _, x = Path(params, rng).carry(transmitter.modulate([pdu], mcs))
+        _, x = Path(params, rng).carry(transmitter.modulate(pdus, mcs))
         lead = np.zeros(LEAD_IN + int(rng.integers(64)), np.complex64)
-        yield pdu, front_end.receive(np.concatenate((lead, x.astype(np.complex64))))
+        yield pdus, front_end.receive(np.concatenate((lead, x.astype(np.complex64))))
 
 
 @dataclass(frozen=True)
@@ -87,19 +87,26 @@ class ErrorRate:
 def error_rate(
     air: Air, mcs: int, n_bytes: int, snr_db: float, seed: int, n: int, enough: int
 ) -> ErrorRate:
-    """Run trials until `enough` errors, at most `n`."""
+    """Run trials with bursts of one PDU until `enough` errors, at most `n`."""
+    return lost_of(air, bursts(air, mcs, n_bytes, snr_db, seed), n, enough)
+
+
+def lost_of(
+    air: Air, stream: Iterator[tuple[list[bytes], NDArray[np.complex64]]], n: int, enough: int
+) -> ErrorRate:
+    """Count the PDUs that are lost of the first `n` bursts, or until `enough` are."""
     receiver = Receiver(max_frequency=PPM * 1e-6 * air.centre_hz / air.rate_hz)
-    tried, errors, missing = 0, 0, b""
-    for pdu, x in bursts(air, mcs, n_bytes, snr_db, seed):
+    tried, errors, missing = 0, 0, set[bytes]()
+    for _, (pdus, x) in zip(range(n), stream, strict=False):
         heard = {event.data for event in receiver.push(x) if isinstance(event, PduHeard)}
         # The end of a burst may only be reported with the first samples of the next.
-        errors += missing not in heard | {b""}
-        missing = b"" if pdu in heard else pdu
-        tried += 1
-        if tried == n or errors >= enough:
+        errors += len(missing - heard)
+        missing = set(pdus) - heard
+        tried += len(pdus)
+        if errors >= enough:
             break
     heard = {event.data for event in receiver.flush() if isinstance(event, PduHeard)}
-    return ErrorRate(tried, errors + (missing not in heard | {b""}))
+    return ErrorRate(tried, errors + len(missing - heard))
 
 
 def needed_snr_db(

@@ -24,20 +24,22 @@ _GROUPS = ((0,), (1,), (2, 3), (4, 5, 6, 7, 8))
 def new_channel(grid: Numerology) -> ArgumentBlock[Channel]:
     """Memory for a channel that is not estimated yet."""
     n_groups, width = len(tones(grid).content.ends) + 1, whole_lanes(grid.n_used)
-    h, centre, turns, inverse, sums = np.zeros((5, 2, width), np.float32)
+    h, speed, centre, turns, inverse, sums = np.zeros((6, 2, width), np.float32)
     return ArgumentBlock(
         Channel(
             h=h,
+            speed=speed,
             centre=centre,
             turns=turns,
             inverse=inverse,
             certainty=np.zeros(width, np.float32),
             sums=sums,
             masses=np.zeros(width, np.float32),
-            unknown=np.zeros(n_groups),
+            unknown=np.zeros((3, n_groups)),
             power=np.zeros(n_groups),
             figures=np.zeros(N_FIGURES),
             tracking=np.zeros((2, 5)),
+            missed=np.zeros((2, len(tones(grid).content.pilots))),
         )
     )
 
@@ -59,9 +61,10 @@ def new_scratch(grid: Numerology) -> ArgumentBlock[Scratch]:
             turned=np.empty(len(table.pilots), np.complex128),
             pilot_power=np.empty(len(table.pilots)),
             rest=np.empty((2, width), np.float32),
+            joined=np.empty((2, width), np.float32),
             coefficients=np.empty((2, len(table.basis)), np.float32),
             energies=np.empty(n_groups),
-            weights=np.empty(n_groups),
+            weights=np.empty((2, n_groups)),
         )
     )
 

@@ -201,6 +201,18 @@ ROWS = {
         "doppler_40hz_1500B_qpsk12_5msps_per",
         "false_pdus_1e9_noise",
     },
+    "rough": {
+        *(f"joined_mid_stream_heard_gap{gap}_{db}db" for gap in (32, 200, 1000) for db in (8, 25)),
+        *(
+            f"deaf_after_strong_signal_ms_{who}_{msps}msps"
+            for who in ("receiver", "carrier_sense") for msps in (1, 5)
+        ),
+        *(f"doppler_{hz}hz_1x1500B_5msps_lost" for hz in (100, 200)),
+        *(f"doppler_{hz}hz_1x220B_1msps_lost" for hz in (40, 100)),
+        *(f"doppler_40hz_{burst}_1msps_lost" for burst in ("5x64B", "4x220B")),
+        *(f"gain_step_64qam_{db}db_lost" for db in (-3, -6)),
+        "false_pdus",
+    },
     "phy_speed": {
         "search_msps_noise",
         "search_msps_gfsk_+20db",

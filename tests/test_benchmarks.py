@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 
 
 # Benchmarks whose rows are all exact, and those that have others as well.
-ALL_EXACT = {"access", "phy_per", "repeats", "team", "timesync"}
+ALL_EXACT = {"access", "phy_per", "repeats", "rough", "team", "timesync"}
 SOME_EXACT = {"defaults", "latency", "pound", "sealing"}
 # Exact rows that miss their targets, and are shown so: see tests/benchmarks_pound/test_lockstep.py.
 MISSED = {

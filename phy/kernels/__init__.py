@@ -20,7 +20,7 @@ from phy.kernels.noise import add_noise
 from phy.kernels.resampler import filter_strided, interpolate
 from phy.kernels.rotation import lean, lean_more
 from phy.kernels.sensing import sense
-from phy.kernels.smoothing import follow, smooth
+from phy.kernels.smoothing import doubt_more, follow, move_on, smooth
 from phy.kernels.timing import correlate, locate
 from phy.kernels.tracking import correct, predict
 from phy.kernels.training import estimate, learn, least_squares, turn_back
@@ -55,6 +55,7 @@ __all__ = [  # noqa: RUF022 (by use)
     "decode_block",
     "decode_codeword",
     "detector_sums",
+    "doubt_more",
     "equalise",
     "estimate",
     "expected_level",
@@ -65,6 +66,7 @@ __all__ = [  # noqa: RUF022 (by use)
     "learn",
     "least_squares",
     "locate",
+    "move_on",
     "predict",
     "smooth",
     "start_tracking",

@@ -50,7 +50,7 @@ from phy.tables.burst import GAIN, NO, PHASE, Planes
 _0: Any = np.int64(0)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def refine(training: Training, h: Planes, room: Room) -> float:
     """The most likely frequency correction from the whole preamble, in cycles per sample.
 
@@ -77,7 +77,7 @@ def refine(training: Training, h: Planes, room: Room) -> float:
     return _peak_of_parabola(training.frequencies, likely)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _make_wave(waves: NDArray[np.float32], h: Planes, out: Planes) -> None:
     """Write the sum of `waves` `[n_used, 2, n]`, each times its gain in `h`, to `out`."""
     n = waves.shape[2]
@@ -94,7 +94,7 @@ def _make_wave(waves: NDArray[np.float32], h: Planes, out: Planes) -> None:
         store(out, n + m, im)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _agree(room: Room, at: int, wave_at: int, sign: np.float32, part: int) -> None:
     """Write Σ z w* over PART samples, from `at` and `wave_at` on, times `sign`, to part `part`."""
     z, w = room.planes, room.wave
@@ -109,7 +109,7 @@ def _agree(room: Room, at: int, wave_at: int, sign: np.float32, part: int) -> No
     room.parts[0, part], room.parts[1, part] = total(re) * sign, total(im) * sign
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _peak_of_parabola(places: NDArray[np.float64], values: NDArray[np.float64]) -> float:
     """Position of the peak of the parabola through the largest value and its neighbors."""
     i = int(min(max(int(values.argmax()), 1), values.size - 2))
@@ -119,7 +119,7 @@ def _peak_of_parabola(places: NDArray[np.float64], values: NDArray[np.float64]) 
     return float(places[i] + min(max(shift, -1.0), 1.0) * (places[1] - places[0]))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def acquire(
     x: NDArray[np.complex64],
     nominal: int,
@@ -168,7 +168,7 @@ def acquire(
     return begin + BACKOFF, frequency
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def settle(
     sent: NDArray[np.float32],
     training_in: PackedArguments,
@@ -209,7 +209,7 @@ def _decibel(ratio: float) -> float:
     return math.floor(1e4 * math.log10(max(ratio, 1e-30)) + 0.5) / 1e3
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def fold(llr: NDArray[np.int16], out: NDArray[np.int16]) -> None:
     """Add up the LLRs of each bit's repetitions, clipped to ±MAX_LLR."""
     for i in range(out.size):

@@ -37,7 +37,7 @@ def _signs_generator(_context: Any, array: Any, at: Any) -> Any:
 _signs: Any = intrinsic(_signs_generator)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def put(out: Words, at: int, word: np.uint64, n: int) -> None:
     """Write the lowest `n` bits of `word` from bit `at` on; that place must hold zeros."""
     i, bit = at >> 6, np.uint64(at & 63)
@@ -46,7 +46,7 @@ def put(out: Words, at: int, word: np.uint64, n: int) -> None:
         out[i + 1] |= word >> (_64 - bit)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def get(words: Words, at: int, n: int) -> np.uint64:
     """The `n` ≤ 64 bits from bit `at` on, as a word."""
     i, bit = at >> 6, np.uint64(at & 63)
@@ -57,13 +57,13 @@ def get(words: Words, at: int, n: int) -> np.uint64:
     return word
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def low_ones(n: int) -> np.uint64:
     """A word with ones in its `n` ≤ 64 lowest bits."""
     return ~np.uint64(0) if n >= 64 else (ONE << np.uint64(n)) - ONE
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def put_signs(values: NDArray[np.int16], first: int, n: int, out: Words, at: int) -> None:
     """Write the signs of `n` values from `first` on as bits from `at` on: 1 where negative."""
     whole = n - n % _LANES
@@ -82,7 +82,7 @@ def _turned(word: np.uint64) -> np.uint64:
     return word
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def to_octets(words: Words, out: NDArray[np.uint8]) -> None:
     """Write words of bits as bytes, the first bit of each byte the highest."""
     for i in range(words.size):
@@ -91,7 +91,7 @@ def to_octets(words: Words, out: NDArray[np.uint8]) -> None:
             out[8 * i + b] = np.uint8(word >> np.uint64(8 * b) & np.uint64(255))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def from_octets(octets: NDArray[np.uint8], out: Words) -> None:
     """Write bytes as words of bits, with zeros after the last byte."""
     for i in range(out.size):

@@ -17,7 +17,7 @@ PARITY_A = np.array([_parity(r & G_A) for r in range(2 * N_STATES)], np.uint8)
 PARITY_B = np.array([_parity(r & G_B) for r in range(2 * N_STATES)], np.uint8)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def convolve(bits: NDArray[np.uint8], out: NDArray[np.uint8]) -> None:
     """Write the mother code's bits A and B in turn `[n, 2 t]` of `bits` `[n, t]`, from state 0."""
     for row in range(bits.shape[0]):

@@ -17,7 +17,7 @@ from phy.tables.block import PackedArguments
 from phy.tables.burst import SLOPE, SLOPE_USED
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def demodulate(
     samples: NDArray[np.complex64],
     n: int,
@@ -55,7 +55,7 @@ def demodulate(
         equalise(y, rows, number + row, tones, axes, channel, scratch, points, llr, row)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def to_tones(
     samples: NDArray[np.complex64],
     starts: NDArray[np.int64],
@@ -71,7 +71,7 @@ def to_tones(
     windows_to_tones(samples, starts, frequency, dc, origin, tones, scratch, out)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def slip(early: int, tones_in: PackedArguments, channel_in: PackedArguments) -> None:
     """Move FFT windows `early` samples earlier, and adapt the slope over subcarriers."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
@@ -80,7 +80,7 @@ def slip(early: int, tones_in: PackedArguments, channel_in: PackedArguments) -> 
     use_slope(channel.figures[SLOPE_USED] - lean, tones, channel)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def learn_channel(
     y: NDArray[np.float32],
     sent: NDArray[np.float32],

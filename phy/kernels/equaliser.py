@@ -11,18 +11,21 @@ from phy.kernels.demapper import LLR_SCALE, axis_llrs
 from phy.kernels.inline import step
 from phy.kernels.lanes import Lanes, load, splat, store, store_int16, total
 from phy.kernels.rotation import lean, lean_more
-from phy.kernels.smoothing import follow
+from phy.kernels.smoothing import doubt_more, follow, move_on, scale
 from phy.kernels.tracking import correct, predict
 from phy.sizes import N_LANES
 from phy.tables.burst import (
     CERTAIN,
-    DRIFT,
+    DOUBT,
+    DUE,
     GAIN,
+    MOVES,
     N_HEARD,
     NO,
     PHASE,
     SLOPE,
     SLOPE_USED,
+    WRONG,
     Axes,
     Channel,
     Row,
@@ -30,10 +33,10 @@ from phy.tables.burst import (
     Tones,
 )
 
-BLOCK = 8
-"""Number of symbols from one correction of the channel to the next."""
-_LEAST_MASS = BLOCK / 4
-"""Least certainty in a block; with less, others were on the air and the block is not used."""
+NO_STEP = 4.0
+"""Times the noise by which data may be off behind a step of gain; else others are on the air."""
+# With less certainty than this in the symbols since the last correction, there is none.
+_LEAST_MASS = 1 / 16
 # Noise floor relative to the signal: echoes and converters always leave this share.
 _LEAST_NOISE = 1e-4
 # Frequency error of the preamble's estimate, in subcarrier spacings: at 0 dB, and at best.
@@ -52,7 +55,7 @@ def _noise(channel: Channel) -> float:
     return float(max(channel.figures[NO], _LEAST_NOISE * channel.figures[GAIN]))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def start_tracking(tones: Tones, channel: Channel, clock_error: float, is_known: bool) -> None:
     """Initialise phase, slope and their uncertainty as they are after the preamble.
 
@@ -68,7 +71,8 @@ def start_tracking(tones: Tones, channel: Channel, clock_error: float, is_known:
     tracking[SLOPE, 4] = (turn * (_CLOCK_DOUBT if is_known else _CLOCK_ERROR)) ** 2
     channel.sums[:] = 0
     channel.masses[:] = 0
-    figures[DRIFT] = figures[N_HEARD] = figures[CERTAIN] = figures[SLOPE_USED] = 0
+    channel.missed[:] = 0
+    figures[N_HEARD] = figures[CERTAIN] = figures[WRONG] = figures[SLOPE_USED] = 0
     lean(0.0, tones.subcarriers, channel.turns)
     renew(channel)
 
@@ -102,8 +106,8 @@ def renew(channel: Channel) -> None:
 @step
 def _pilots(
     re: Row, im: Row, polarity: float, tones: Tones, channel: Channel, scratch: Scratch
-) -> float:
-    """Track phase and slope to this symbol by its pilots; returns its noise per subcarrier."""
+) -> tuple[float, float]:
+    """Track a symbol's phase, slope and amplitude by its pilots; returns (noise, amplitude)."""
     tracking, turned, power = channel.tracking, scratch.turned, scratch.pilot_power
     predict(tracking)
     back = complex(math.cos(tracking[PHASE, 0]), -math.sin(tracking[PHASE, 0])) * polarity
@@ -116,19 +120,31 @@ def _pilots(
         turned[p] = complex(re[at], im[at]) * h.conjugate() * turn
         power[p] = h.real * h.real + h.imag * h.imag
     subcarriers = tones.subcarriers[tones.n_data :]
-    return correct(turned, power, subcarriers, _noise(channel), tracking)
+    no, movement, amplitude, differ = correct(
+        turned, power, subcarriers, _noise(channel), channel.figures, channel.missed, tracking
+    )
+    if amplitude != 1.0:
+        scale(amplitude, channel)
+        renew(channel)
+    if movement > 0.0:
+        doubt_more(movement, tones, channel)
+    if differ or movement > 0.0:
+        channel.figures[DUE] = 1
+    return no, amplitude
 
 
 @step
 def _data(
-    re: Row, im: Row, c: float, s: float, trust: float, axes: Axes, channel: Channel,
-    scratch: Scratch, n: int,
-) -> float:  # fmt: skip
+    re: Row, im: Row, c: float, s: float, trust: float, belief: float, axes: Axes,
+    channel: Channel, scratch: Scratch, n: int,
+) -> tuple[float, float, float]:  # fmt: skip
     """Convert a symbol's `n` data subcarriers to levels, and to LLRs plane by plane.
 
-    The subcarriers are rotated by c + js and by the slope in use. With their likely values, they
-    are added to the channel's sums and masses, times `trust`. Returns the certain part of them, Σ
-    |E s|² times `trust`.
+    The subcarriers are rotated by c + js and by the slope in use. Their certainty is `belief` times
+    that of the gains. With their likely values, they are added to the channel's sums and masses,
+    times `trust`. Returns the certain part of them, Σ |E s|² times `trust`, and what wrong ones
+    contribute: Σ |h|² (E|s|² − |E s|²), likewise, in units of LLRs; and how far points are from
+    those decided, as a share of the noise.
     """
     width = channel.masses.size
     turns, inverse, sums = channel.turns, channel.inverse, channel.sums
@@ -136,8 +152,11 @@ def _data(
     level, llr, unit = scratch.level, scratch.llr, axes.unit
     real_bits, imag_bits, imag_at = axes.real_bits, axes.imag_bits, axes.real_bits * n
     cos, sin, per_unit = splat(c), splat(s), splat(1 / unit)
-    sureness, by = splat(unit * unit * trust), splat(unit * trust)
+    sureness, believed = splat(unit * unit * trust), splat(unit * unit * belief)
+    by = splat(unit * trust)
     certain: Lanes = splat(0)
+    wrong: Lanes = splat(0)
+    off: Lanes = splat(0)
     for d in range(0, n, N_LANES):
         a, b = load(re, d), load(im, d)
         a, b = a * cos - b * sin, a * sin + b * cos
@@ -147,7 +166,7 @@ def _data(
         level_re, level_im = a * by_re - b * by_im, a * by_im + b * by_re
         store(level, d, level_re)
         store(level, width + d, level_im)
-        sure = load(certainty, d) * sureness
+        sure = load(certainty, d) * believed
         axis_llrs(level_re, sure, real_bits, llr, d, n)
         mean_re, square = expected_level(llr, real_bits, d, n)
         mean_im: Lanes = splat(0)
@@ -158,8 +177,13 @@ def _data(
         store(sums, d, load(sums, d) + (a * mean_re + b * mean_im) * by)
         store(sums, width + d, load(sums, width + d) + (b * mean_re - a * mean_im) * by)
         store(masses, d, load(masses, d) + square * sureness)
-        certain = certain + (mean_re * mean_re + mean_im * mean_im)
-    return float(total(certain)) * unit * unit * trust
+        mean = mean_re * mean_re + mean_im * mean_im
+        certain = certain + mean
+        wrong = wrong + load(certainty, d) * (square - mean)
+        off_re, off_im = level_re - mean_re, level_im - mean_im
+        off = off + load(certainty, d) * (off_re * off_re + off_im * off_im)
+    size, share = unit * unit * trust, unit * unit / (LLR_SCALE * n)
+    return float(total(certain)) * size, float(total(wrong)) * size, float(total(off)) * share
 
 
 @step
@@ -183,25 +207,25 @@ def _correct_channel(tones: Tones, channel: Channel, scratch: Scratch) -> None:
     """Correct the gains with the last symbols, as decided.
 
     This is a step of expectation maximisation. Uncertainty makes such a step too short; it is
-    lengthened to compensate.
+    lengthened to compensate. A wrong decision disturbs it like noise.
     """
     figures, sums, h, width = channel.figures, channel.sums, channel.h, channel.masses.size
-    mass = figures[CERTAIN] / tones.bins.size
+    mass, n = figures[CERTAIN] / tones.bins.size, int(figures[N_HEARD])
     if mass > _LEAST_MASS:
         share = splat(1 / mass)
         for k in range(0, width, N_LANES):
-            known = load(channel.masses, k)
-            store(sums, k, (load(sums, k) - load(h, k) * known) * share)
-            at = width + k
-            store(sums, at, (load(sums, at) - load(h, at) * known) * share)
-        follow(sums, _noise(channel) / mass, tones, channel, scratch)
+            re, im, known = load(h, k), load(h, width + k), load(channel.masses, k)
+            store(sums, k, (load(sums, k) - re * known) * share)
+            store(sums, width + k, (load(sums, width + k) - im * known) * share)
+        noise = _noise(channel) + max(0.0, figures[WRONG]) / figures[CERTAIN]
+        follow(sums, noise / mass, n, tones, channel, scratch)
         renew(channel)
     sums[:] = 0
     channel.masses[:] = 0
-    figures[N_HEARD] = figures[CERTAIN] = 0
+    figures[N_HEARD] = figures[CERTAIN] = figures[WRONG] = 0
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def equalise(
     y: NDArray[np.float32],
     n: int,
@@ -227,13 +251,23 @@ def equalise(
     most_lag = _LAG / tones.n_fft * 2
     for row in range(n):
         re, im, polarity = y[row, 0], y[row, 1], tones.polarity[number + row]
-        no = _pilots(re, im, polarity, tones, channel, scratch)
+        if figures[MOVES] > 0:
+            move_on(tones, channel)
+            renew(channel)
+        no, amplitude = _pilots(re, im, polarity, tones, channel, scratch)
         if abs(channel.tracking[SLOPE, 0] - figures[SLOPE_USED]) > most_lag:
             use_slope(channel.tracking[SLOPE, 0], tones, channel)
         # A symbol with more noise than the preamble, as under interference, counts less.
         phase, trust = channel.tracking[PHASE, 0], _noise(channel) / no
+        belief = _noise(channel) / (no + figures[DOUBT])
         c, s = math.cos(phase), -math.sin(phase)
-        certain = _data(re, im, c, s, trust, axes, channel, scratch, n_data)
+        if amplitude != 1.0:
+            # Pilots of another burst may look like a step of gain; its data do not.
+            _, _, off = _data(re, im, c, s, 0.0, belief, axes, channel, scratch, n_data)
+            if off > NO_STEP:
+                no = off * _noise(channel)
+                trust, belief = 1 / off, _noise(channel) / (no + figures[DOUBT])
+        certain, wrong, _ = _data(re, im, c, s, trust, belief, axes, channel, scratch, n_data)
         if points.shape[0]:
             for d in range(n_data):
                 re_level, im_level = scratch.level[0, d], scratch.level[1, d]
@@ -245,6 +279,7 @@ def equalise(
             llr[at + k] = planes[gather[k]]
         _learn_pilots(re, im, complex(c, s), trust, polarity, tones, channel)
         figures[CERTAIN] += certain + n_pilots * trust
+        figures[WRONG] += wrong * _noise(channel) / LLR_SCALE
         figures[N_HEARD] += 1
-        if figures[N_HEARD] == BLOCK:
+        if figures[N_HEARD] >= figures[DUE]:
             _correct_channel(tones, channel, scratch)

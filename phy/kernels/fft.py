@@ -18,7 +18,7 @@ from phy.sizes import N_LANES
 from phy.tables.burst import Planes, Row, Scratch, Tones
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def circle(frequency: float, size: float, out: Planes) -> None:
     """Write size · exp(j 2π · frequency · m) for m = 0, 1, … to `out` `[2, n]`."""
     step = complex(math.cos(2 * math.pi * frequency), math.sin(2 * math.pi * frequency))
@@ -28,7 +28,7 @@ def circle(frequency: float, size: float, out: Planes) -> None:
         value *= step
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def eight_windows(
     samples: NDArray[np.complex64],
     starts: NDArray[np.int64],
@@ -66,7 +66,7 @@ def eight_windows(
     _sort(re, im, n, tones.bins, square, out)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def windows_to_tones(
     samples: NDArray[np.complex64],
     starts: NDArray[np.int64],
@@ -108,7 +108,7 @@ def transpose(square: Row) -> None:
     store(square, 56, h)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _sort(
     re: Row, im: Row, n: int, bins: NDArray[np.int64], square: Row, out: NDArray[np.float32]
 ) -> None:
@@ -126,7 +126,7 @@ def _sort(
                 store(out, (2 * lane + part) * width + first, load(square, N_LANES * lane))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def transform(
     re: Row, im: Row, to_re: Row, to_im: Row, n: int, twiddles: NDArray[np.float32]
 ) -> bool:
@@ -150,7 +150,7 @@ def transform(
     return swapped
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _radix_4(
     re: Row, im: Row, to_re: Row, to_im: Row, n: int, stride: int, twiddles: NDArray[np.float32]
 ) -> None:
@@ -186,7 +186,7 @@ def _radix_4(
             store(to_im, to, x_re * w3_im + x_im * w3_re)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _radix_2(re: Row, im: Row, to_re: Row, to_im: Row, stride: int) -> None:
     """Run the last stage for sizes that are not a power of 4."""
     half = N_LANES * stride

@@ -45,7 +45,7 @@ SURE = 4000
 """LLR of a bit that is known to be 0."""
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def decode_codeword(
     llr: NDArray[np.int16], form: Form, max_iterations: int, work: Workspace
 ) -> int:
@@ -74,7 +74,7 @@ def decode_codeword(
     return 0
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def decode_blocks(
     llr: NDArray[np.int16],
     max_iterations: int,
@@ -127,7 +127,7 @@ def decode_blocks(
             out[block, i] ^= white[block * out.shape[1] + i]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _begins_with(parity: Words, sent: Words, z: int, n: int) -> bool:
     """Whether the parity `[rows, 2]`, block after block, begins with the `n` bits `sent`."""
     different = np.uint64(0)

@@ -42,7 +42,7 @@ def _part(repeated: Words, first: int) -> np.uint64:
     return part
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def parity_of(bits: Words, form: Form, parity: Words) -> None:
     """Write the parity `[rows, 2]`, one row per block, of information `bits` `[K z / 64 + 1]`.
 
@@ -92,7 +92,7 @@ def unpack(words: Words, n: int, out: NDArray[np.uint8], at: int) -> None:
         out[at + i] = words[i >> 6] >> np.uint64(i & 63) & ONE
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def encode_codeword(
     bits: Words, number: int, form: Form, parity: Words, out: NDArray[np.uint8], at: int
 ) -> None:
@@ -110,7 +110,7 @@ def encode_codeword(
         unpack(parity[row], min(z, n_parity - first), out, at + share + first)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def encode_blocks(
     blocks: NDArray[np.uint8], form_in: PackedArguments, out: NDArray[np.uint8]
 ) -> None:
@@ -130,7 +130,7 @@ def encode_blocks(
             encode_codeword(bits, number, form, parity, out[block], int(form.ends[number]))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def encode_octets(
     octets: NDArray[np.uint8], n_blocks: int, form: Form, out: NDArray[np.uint8]
 ) -> None:

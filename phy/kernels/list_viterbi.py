@@ -15,7 +15,7 @@ from phy.kernels.local import local
 _UNREACHED = -(1 << 30)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def list_decode(llr: NDArray[np.int16], out: NDArray[np.uint8]) -> None:
     """Write the bits `[n_list, t]` of the likeliest paths, best first; LLRs are `[2 t]`.
 
@@ -54,7 +54,7 @@ def list_decode(llr: NDArray[np.int16], out: NDArray[np.uint8]) -> None:
             state, rank = (2 * state + (origin & 1)) % N_STATES, origin >> 1
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _agreement(a: int, b: int, register: int) -> int:
     """How well LLRs agree with the encoder's output from `register`."""
     return (-a if PARITY_A[register] else a) + (-b if PARITY_B[register] else b)

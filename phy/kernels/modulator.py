@@ -37,7 +37,7 @@ def map_symbol(
         y[0, k] = y[1, k] = 0
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def eight_symbols(
     y: NDArray[np.float32],
     n: int,
@@ -86,7 +86,7 @@ def eight_symbols(
             out[m] = out[m + n_fft]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def modulate(
     octets: NDArray[np.uint8],
     n_blocks: int,
@@ -111,7 +111,7 @@ def modulate(
     modulate_bits(coded, number, peak, tones_in, map_in, out)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def modulate_bits(
     coded: NDArray[np.uint8],
     number: int,

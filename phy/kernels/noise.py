@@ -30,7 +30,7 @@ _SIN = tuple(_F32(each) for each in (-1.9515295891e-4, 8.3321608736e-3, -1.66666
 _COS = tuple(_F32(each) for each in (2.4433157118e-5, -1.3887316255e-3, 4.1666645683e-2))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def add_noise(
     x: NDArray[np.float32],
     key: int,
@@ -57,7 +57,7 @@ def add_noise(
         done += m
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _split(z: np.uint64) -> np.uint64:
     """The hash of splitmix64, from 64 bits to 64."""
     z = (z ^ (z >> _U64(30))) * _U64(0xBF58476D1CE4E5B9)
@@ -65,7 +65,7 @@ def _split(z: np.uint64) -> np.uint64:
     return z ^ (z >> _U64(31))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _hash(key: np.uint32, first: int, out: NDArray[np.uint32]) -> None:
     """Write 32 random bits for each counter from `first` on: Wellons' triple32 with a key."""
     for i in range(out.size):

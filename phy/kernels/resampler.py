@@ -10,7 +10,7 @@ from phy.kernels.lanes import Lanes, load, pairs, splat
 from phy.sizes import N_LANES
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def interpolate(
     parts: NDArray[np.float32],
     filters: NDArray[np.float32],
@@ -41,7 +41,12 @@ def interpolate(
         out[n] = complex(re, im)
 
 
-@njit(nogil=True, cache=True, fastmath={"reassoc", "contract", "nsz"})
+@njit(
+    nogil=True,
+    cache=True,
+    error_model="numpy",
+    fastmath={"reassoc", "contract", "nsz"},
+)
 def _dot(weights: NDArray[np.float32], x: NDArray[np.float32]) -> np.float32:
     """The dot product of two rows, summed in whatever order is fastest."""
     total = np.float32(0)
@@ -50,7 +55,7 @@ def _dot(weights: NDArray[np.float32], x: NDArray[np.float32]) -> np.float32:
     return total
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def filter_strided(
     x: NDArray[np.complex64],
     first: int,

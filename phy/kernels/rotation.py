@@ -12,7 +12,7 @@ from phy.kernels.local import local
 from phy.sizes import N_LANES
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def lean(slope: float, subcarriers: NDArray[np.int64], out: NDArray[np.float32]) -> None:
     """Write exp(j · slope · k) for each k of `subcarriers` `[n]` to `out` `[2, ≥ n]`."""
     edge = np.int64(0)

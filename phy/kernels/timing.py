@@ -25,7 +25,7 @@ _COHERENT = 64
 _LAG = 64
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def correlate(planes: Planes, templates: NDArray[np.complex64], out: NDArray[np.float32]) -> None:
     """Write how strongly two consecutive templates match at each offset of `planes` `[2, …]`.
 
@@ -60,7 +60,7 @@ def _match(planes: Planes, at: int, template: NDArray[np.complex64]) -> tuple[La
     return re, im
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def locate(planes: Planes, templates: NDArray[np.complex64]) -> tuple[int, float]:
     """(first sample of the long training's first echo or −1, frequency in cycles per sample).
 

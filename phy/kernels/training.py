@@ -10,16 +10,16 @@ from phy.kernels.fft import circle
 from phy.kernels.inline import step
 from phy.kernels.lanes import Lanes, load, splat, store, total
 from phy.kernels.local import local
-from phy.kernels.smoothing import smooth
+from phy.kernels.smoothing import smooth, start
 from phy.sizes import N_LANES
-from phy.tables.burst import GAIN, NO, Channel, Planes, Row, Scratch, Tones
+from phy.tables.burst import GAIN, NO, SCALED, Channel, Planes, Row, Scratch, Tones
 
 # Number of standard deviations from which a difference in strength is not chance.
 _SURELY = 4.0
 _LARGEST_BOOST = 3.0
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Planes) -> None:
     """Write `x` `[n]` minus `dc`, rotated by −`frequency` cycles a sample, to `out` `[2, …]`."""
     span, n = 32, x.size
@@ -37,7 +37,7 @@ def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Plan
             out[1, begin + m] = a * im + b * re
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def least_squares(
     y: NDArray[np.float32], amplitude: Row, sent: NDArray[np.float32], h: Planes
 ) -> tuple[float, float]:
@@ -84,7 +84,7 @@ def _pair(
     return load(y, at), load(y, at + width), load(sent, at), load(sent, at + width)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def estimate(
     y: NDArray[np.float32],
     amplitude: Row,
@@ -104,9 +104,10 @@ def estimate(
     # Measured gains include noise. If they contain nothing else, the difference may be negative.
     channel.figures[GAIN] = max(power - no / mass, 1e-3 * power, 1e-20)
     smooth(no / mass, tones, channel, scratch)
+    start(tones, channel)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def learn(
     y: NDArray[np.float32],
     sent: NDArray[np.float32],
@@ -141,7 +142,8 @@ def learn(
     amplitude[:] = 1
     match, power = float(total(seen)), float(total(expected))
     if match > 0.0:
-        ratio = power / match
+        # The gains may have been scaled to the header.
+        ratio = power / match / channel.figures[SCALED]
         if abs(1 / ratio - 1) > _SURELY * math.sqrt(0.5 * channel.figures[NO] / power):
             for s in range(n_training):
                 amplitude[s] = min(max(ratio, 1 / _LARGEST_BOOST), _LARGEST_BOOST)

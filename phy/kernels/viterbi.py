@@ -106,7 +106,7 @@ def _emit_steps(builder: Any, llr: Any, decisions: Any, n_steps: Any) -> None:
         builder.store(builder.shuffle_vector(low, high, odds), odd)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def decode_block(
     llr: NDArray[np.int16], decisions: NDArray[np.uint64], out: NDArray[np.uint8]
 ) -> None:
@@ -122,7 +122,7 @@ def decode_block(
         state = (state & 31) << 1 | won_by_odd
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def decode_rows(
     llr: NDArray[np.int16],
     kept: NDArray[np.int32],

@@ -11,14 +11,23 @@ from phy.reference.channel import Channel
 from phy.reference.demapper import LLR_SCALE, axis_llrs, expected_levels
 from phy.reference.mapping import deinterleaved
 from phy.reference.ofdm import Subcarriers
-from phy.reference.smoothing import follow
-from phy.reference.tracking import Tracking
+from phy.reference.smoothing import doubt_more, follow, move_on, scale
+from phy.reference.tracking import Shown, Tracking
 from phy.sequences import polarity
 
-BLOCK = 8
-"""Number of symbols after which the channel is corrected."""
-LEAST_MASS = BLOCK / 4
-"""Least certainty in a block; with less, others were on the air and the block is not used."""
+NO_STEP = 4.0
+"""Times the noise by which data may be off behind a step of gain; else others are on the air."""
+LEAST_MASS = 1 / 16
+"""With less certainty in the symbols since the last correction of the channel, there is none."""
+
+
+class Tracked(NamedTuple):
+    """A symbol whose pilots were looked at."""
+
+    y: Subcarriers
+    no: float
+    angle: NDArray[np.float64]
+    sign: float
 
 
 class Decided(NamedTuple):
@@ -44,37 +53,76 @@ class Equaliser:
     ) -> tuple[NDArray[np.int16], Subcarriers]:
         """Convert symbols `[n, n_used]` to LLRs in the order of the code, and points.
 
-            u = Y exp(−j(φ + sk)) / Ĥ;  L = |Ĥ|²/N (min_{x: bit 1} |u − x|² − min_{x: bit 0} …)
+            u = Y exp(−j(φ + sk)) / Ĥ;  L = |Ĥ|²/N' (min_{x: bit 1} |u − x|² − min_{x: bit 0} …)
 
-        LLRs `[n · n_data · bits]` are in eighths, positive for 0; the equalised points are
-        `[n, n_data]`. The header's first symbol has number 0; the first one here has `number`, and
-        symbols are consecutive.
+        N' is the noise and the mean variance of Ĥ. LLRs `[n · n_data · bits]` are in eighths,
+        positive for 0; the equalised points are `[n, n_data]`. The header's first symbol has number
+        0; the first one here has `number`, and symbols are consecutive.
         """
-        done, parts = 0, []
-        while done < len(y):
-            # With the last symbol of a block the channel changes.
-            n = min(len(y) - done, BLOCK - self._n_heard)
-            parts.append(self._equalise(y[done : done + n], number + done, modulation))
-            done += n
+        waiting: list[Tracked] = []
+        parts = []
+        for each, sign in zip(y, polarity(len(y), number).tolist(), strict=True):
+            if self.channel.moves:
+                # The channel moves, so each symbol has its own.
+                parts += self._equalise(waiting, modulation)
+                self._move_on()
+            self.tracking.predict()
+            shown = self.tracking.correct(each[self._grid.pilots_at], sign, self.channel)
+            if shown.movement > 0 or shown.amplitude != 1:
+                parts += self._equalise(waiting, modulation)
+                self._believe(shown)
+            if shown.differ or shown.movement > 0:
+                self.channel.due = 1
+            tracked = Tracked(each, shown.no, self.tracking.angle, sign)
+            if shown.amplitude != 1:
+                tracked = self._examined(tracked, modulation)
+            waiting.append(tracked)
+            if self._n_heard + len(waiting) >= self.channel.due:
+                parts += self._equalise(waiting, modulation)
+                self._correct_channel()
+        parts += self._equalise(waiting, modulation)
         return np.concatenate([llr for llr, _ in parts]), np.concatenate([u for _, u in parts])
 
+    def _move_on(self) -> None:
+        """Move the channel on to the next symbol; what is left of the sums remains the same."""
+        self._sums += self.channel.speed * self._masses
+        move_on(self.channel, self._grid)
+
+    def _believe(self, shown: Shown) -> None:
+        """Change what is known of the channel by what a symbol's pilots show."""
+        if shown.amplitude != 1:
+            scale(shown.amplitude, self.channel)
+            self._sums *= shown.amplitude
+        if shown.movement > 0:
+            doubt_more(shown.movement, self.channel, self._grid)
+
+    def _examined(self, symbol: Tracked, modulation: Modulation) -> Tracked:
+        """Tell a step of gain from another burst, whose pilots look like one, by the data."""
+        channel = self.channel
+        h = channel.h[self._grid.data_at]
+        u = (symbol.y * np.exp(-1j * symbol.angle))[self._grid.data_at] / h
+        certainty = np.abs(h) ** 2 / (symbol.no + channel.doubt)
+        _, decided = demap(u[None], certainty[None], modulation)
+        off = np.abs(h) ** 2 * np.abs(u - decided.mean[0]) ** 2
+        share = float(np.mean(off)) / channel.noise
+        return symbol._replace(no=share * channel.noise) if share > NO_STEP else symbol
+
     def _equalise(
-        self, y: Subcarriers, number: int, modulation: Modulation
-    ) -> tuple[NDArray[np.int16], Subcarriers]:
-        """Equalise symbols of one block."""
-        grid, signs = self._grid, polarity(len(y), number)
-        pilots, no, angle = y[:, grid.pilots_at], np.empty(len(y)), np.empty(y.shape)
-        for i, sign in enumerate(signs.tolist()):
-            self.tracking.predict()
-            no[i] = self.tracking.correct(pilots[i], sign, self.channel)
-            angle[i] = self.tracking.angle
+        self, waiting: list[Tracked], modulation: Modulation
+    ) -> list[tuple[NDArray[np.int16], Subcarriers]]:
+        """Equalise the `waiting` symbols, all with the present gains; empties the list."""
+        if not waiting:
+            return []
+        grid, channel = self._grid, self.channel
+        y, no, angle, signs = (np.array(each) for each in zip(*waiting, strict=True))
+        waiting.clear()
         turned = y * np.exp(-1j * angle)
-        h = self.channel.h[grid.data_at]
+        h = channel.h[grid.data_at]
         power = np.abs(h) ** 2
         u = turned[:, grid.data_at] * (h.conj() / (power + 1e-30))
-        llr, decided = demap(u, power / no[:, None], modulation)
-        self._learn(turned, decided, signs, self.channel.noise / no)
-        return deinterleaved(llr, modulation, grid), u
+        llr, decided = demap(u, power / (no + channel.doubt)[:, None], modulation)
+        self._learn(turned, decided, signs, channel.noise / no)
+        return [(deinterleaved(llr, modulation, grid), u)]
 
     def _learn(
         self,
@@ -83,7 +131,7 @@ class Equaliser:
         signs: NDArray[np.float32],
         trust: NDArray[np.float64],
     ) -> None:
-        """Add symbols to the block's sums: Σ Y (E s)*, Σ E|s|², Σ|E s|².
+        """Add symbols to the sums: Σ Y (E s)*, Σ E|s|², Σ|E s|², Σ|Ĥ|² (E|s|² − |E s|²).
 
         Pilots are certain. A symbol with interference counts less: `trust` is N over its own noise.
         """
@@ -94,34 +142,38 @@ class Equaliser:
         square[:, grid.pilots_at] = 1.0
         matched = trust[:, None] * (turned * mean.conj())
         certain = trust * np.sum(np.abs(mean) ** 2, axis=1)
+        power = np.abs(self.channel.h) ** 2
+        wrong = trust * np.sum(power * (square - np.abs(mean) ** 2), axis=1)
         # One after another, so that it does not matter how many come at once.
         for i in range(len(turned)):
             self._sums += matched[i]
             self._masses += trust[i] * square[i]
             self._certain += float(certain[i])
+            self._wrong += float(wrong[i])
         self._n_heard += len(turned)
-        if self._n_heard == BLOCK:
-            self._correct_channel()
 
     def _correct_channel(self) -> None:
-        """Correct the gains after a block of symbols: a step of expectation maximisation.
+        """Correct gains and speeds by the last symbols: a step of expectation maximisation.
 
             ΔĤ = (Σ Y (E s)* − Ĥ Σ E|s|²) / Σ|E s|²
 
         The last sum is averaged over the subcarriers. It is less than Σ E|s|², which lengthens the
-        step and compensates the shortening by uncertainty. The error has the noise N / Σ|E s|².
+        step and compensates the shortening by uncertainty. The error has the variance
+        (N + Σ |Ĥ|² (E|s|² − |E s|²) / Σ|E s|²) / Σ|E s|²: a wrong decision disturbs it like noise.
         """
-        mass = self._certain / self._grid.n_used
+        mass, channel = self._certain / self._grid.n_used, self.channel
         if mass > LEAST_MASS:
-            error = (self._sums - self.channel.h * self._masses) / mass
-            follow(error, self.channel.noise / mass, self.channel, self._grid)
+            error = (self._sums - channel.h * self._masses) / mass
+            noise = channel.noise + max(0.0, self._wrong) / self._certain
+            follow(error, noise / mass, self._n_heard, channel, self._grid)
         self._forget_block()
 
     def _forget_block(self) -> None:
         """Reset the sums for a new block."""
         self._sums = np.zeros(self._grid.n_used, np.complex128)
         self._masses = np.zeros(self._grid.n_used)
-        self._certain, self._n_heard = 0.0, 0
+        self._certain = self._wrong = 0.0
+        self._n_heard = 0
 
 
 def demap(

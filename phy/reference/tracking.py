@@ -5,6 +5,7 @@ sender's sampling clock drifts away from ours.
 """
 
 import cmath
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,18 @@ from phy.reference.ofdm import Subcarriers
 PHASE_NOISE = (5e-5, 1e-10)
 SLOPE_NOISE = (1e-10, 1e-15)
 """Process noise of (value, rate) per symbol: oscillator noise and modelling errors."""
-SURPRISE = 6.0
-"""Excess of pilot noise over N, as a factor, at which pilots and their symbol lose trust."""
+INTERFERENCE, MOVEMENT = 3.0, 6.0
+"""Excess of the pilots' errors over what is expected, as a factor, that is not chance."""
+DIFFER = 2.5
+"""The same if phase and amplitude count: it only hastens what is due."""
+STEP = 4.5
+"""Number of standard deviations from which a difference in amplitude or phase is a step of it."""
+LEAST_STEP = 0.08
+"""A smaller step, relative or in radians, is left to the filters: clipped peaks make some."""
+CLEARLY = 0.03
+"""Variance in rad² up to which pilots tell a step of phase: with more noise, angles mislead."""
+LAST = 0.3
+"""Share of a difference in amplitude with which its filter ends: that of the third symbol."""
 FREQUENCY_ERROR_0_DB, FREQUENCY_ERROR_MIN = 0.006, 0.0005
 """Error of the preamble's offset in subcarrier spacings: at 0 dB, and at best."""
 CLOCK_ERROR, CLOCK_DOUBT = 40e-6, 5e-6
@@ -48,6 +59,17 @@ class Kalman:
         self._b += self._c
         self._c += self._noise[1]
 
+    def correct_surely(self, innovation: float, variance: float) -> None:
+        """Correct; what surprises by more than STEP standard deviations is believed at once.
+
+        Else data decided in a wrong quadrant would turn the gains along, for ever.
+        """
+        total = self._a + variance
+        is_step = abs(innovation) > LEAST_STEP and innovation**2 > STEP**2 * total
+        if is_step and total < CLEARLY:
+            self._a += innovation**2
+        self.correct(innovation, variance)
+
     def correct(self, innovation: float, variance: float) -> None:
         """Correct by a measured deviation: x += K i, C −= K C₀, K = C₀ / (C₀₀ + variance)."""
         a, b = self._a, self._b
@@ -55,6 +77,19 @@ class Kalman:
         self.value += of_value * innovation
         self.rate += of_rate * innovation
         self._a, self._b, self._c = a - of_value * a, b - of_value * b, self._c - of_rate * b
+
+
+class Shown(NamedTuple):
+    """What a symbol's pilots show besides phase and slope."""
+
+    no: float
+    """The noise on a subcarrier, interference included."""
+    movement: float
+    """The power by which the gains' errors exceed their doubt."""
+    amplitude: float
+    """The step of all gains: 1 if there is none."""
+    differ: bool
+    """Whether the pilots differ at all, which asks for a correction of the channel."""
 
 
 class Tracking:
@@ -71,6 +106,8 @@ class Tracking:
         turn = 2 * np.pi * grid.n_symbol / grid.n_fft
         offset = max(FREQUENCY_ERROR_0_DB * np.sqrt(channel.no / channel.gain), FREQUENCY_ERROR_MIN)
         doubt = CLOCK_ERROR if clock_error is None else CLOCK_DOUBT
+        # Errors of the last symbol's pilots.
+        self._missed = np.zeros(len(self._k), np.complex128)
         self.phase = Kalman(PHASE_NOISE, 0.0, turn * offset)
         self.slope = Kalman(SLOPE_NOISE, turn * (clock_error or 0.0), turn * doubt)
 
@@ -84,8 +121,8 @@ class Tracking:
         """The phase of each subcarrier in use `[n_used]`: φ + sk."""
         return np.asarray(self.phase.value + self.slope.value * self._grid.used, np.float64)
 
-    def correct(self, pilots: Subcarriers, polarity: float, channel: Channel) -> float:
-        """Correct φ and s by a symbol's pilots `[n_pilots]`; returns the noise that they show.
+    def correct(self, pilots: Subcarriers, polarity: float, channel: Channel) -> Shown:
+        """Correct φ and s by a symbol's pilots `[n_pilots]`; returns what else they show.
 
         θ_p = arg(Y_p Ĥ*_p P_p) − φ − s k_p;  S_i = Σ|Ĥ_p|² k_p^i
         Var(φ) = N/2 · S₂ / (S₀S₂ − S₁²),  Var(s) = N/2 · S₀ / (S₀S₂ − S₁²)
@@ -93,36 +130,66 @@ class Tracking:
         k, h = self._k, channel.h[self._grid.pilots_at]
         back = np.exp(-1j * (self.phase.value + self.slope.value * k))
         turned = pilots * h.conj() * (polarity * self._pilots) * back
-        return self.correct_by(turned, np.abs(h) ** 2, k, channel.noise)
+        return self.correct_by(turned, np.abs(h) ** 2, k, channel)
 
     def correct_by(
-        self, turned: Subcarriers, weight: NDArray[np.float64], k: NDArray[np.int64], no: float
-    ) -> float:
+        self,
+        turned: Subcarriers,
+        weight: NDArray[np.float64],
+        k: NDArray[np.int64],
+        channel: Channel,
+    ) -> Shown:
         """Correct φ and s by weighted least squares over the angles of the pilots.
 
         `turned` is the received pilots, rotated back as predicted, times the conjugate of the
-        expected ones; `weight` is |Ĥ_p|², `k` are the subcarriers, each `[n]`. The result is the
-        noise power on a subcarrier: `no`, or the pilots' own if they disagree by far more.
+        expected ones; `weight` is |Ĥ_p|², `k` are the subcarriers, each `[n]`. Pilots that differ
+        by more than the noise and the gains' doubt are evidence: of interference if they differed
+        otherwise a symbol before, else of movement.
         """
-        total = complex(turned.sum())
-        if total == 0:
-            return no
+        no, doubt, spread = channel.noise, channel.doubt, channel.spread
+        total, expected = complex(turned.sum()), float(weight.sum())
+        if total == 0 or expected <= 0:
+            return Shown(no, 0.0, 1.0, False)
+        more = abs(total) / expected - 1
+        variance = (no + doubt) / (2 * expected)
+        if abs(more) > LEAST_STEP and more**2 > STEP**2 * (variance + spread):
+            spread = 1.0
+        amplitude = 1 + more * spread / (spread + variance)
         # First the common phase; then the remaining angles are small: arg z ≈ Im z/|z|.
         common = cmath.phase(total)
         aligned = turned * cmath.exp(-1j * common)
+        h = np.sqrt(weight)
+        heard = weight > 0
+        missed = np.where(heard, aligned / np.where(heard, h, 1) - amplitude * h, self._missed)
+        residual = float(np.sum(np.abs(missed[heard]) ** 2))
+        change = float(np.sum(np.abs(missed - self._missed) ** 2))
+        self._missed = missed
+        n, movement = len(turned), 0.0
+        whole = float(np.sum(np.abs(turned[heard] / h[heard] - h[heard]) ** 2))
+        differ = whole > DIFFER * (n * (no + doubt) + self.phase.covariance[0] * expected)
+        foreign = min(residual, change - n * no)
+        is_foreign = foreign > INTERFERENCE * n * (no + doubt)
+        if is_foreign:
+            no = foreign / n
+        elif residual > MOVEMENT * n * (no + doubt):
+            movement = residual / n - no - doubt
+        noise = no + doubt + movement
+        if spread > 0:
+            share = spread / (spread + noise / (2 * expected))
+            amplitude, spread = 1 + more * share, spread * (1 - share)
+            # From here on, the gains' own filters do better.
+            spread = spread if share >= LAST else 0.0
+        channel.spread = spread
         pilots = list(zip(aligned.tolist(), weight.tolist(), k.tolist(), strict=True))
-        disagreement = sum(abs(z - w) ** 2 / w for z, w, _ in pilots if w > 0)
-        if disagreement > SURPRISE * len(pilots) * no:
-            no = disagreement / len(pilots)
         s0, s1, s2 = (sum(w * k**i for _, w, k in pilots) for i in range(3))
         # The sum Σ θ of the weighted angles is 0 by the choice of the common phase.
         t1 = sum(z.imag * k for z, _, k in pilots)
         det = s0 * s2 - s1 * s1
-        if not det > 0:
-            return no
-        self.phase.correct(common - s1 * t1 / det, no / 2 * s2 / det)
-        self.slope.correct(s0 * t1 / det, no / 2 * s0 / det)
-        return no
+        if det > 0:
+            correct = self.phase.correct if is_foreign else self.phase.correct_surely
+            correct(common - s1 * t1 / det, noise / 2 * s2 / det)
+            self.slope.correct(s0 * t1 / det, noise / 2 * s0 / det)
+        return Shown(no, movement, amplitude, differ)
 
     def slip(self, early: int) -> None:
         """Reduce the slope for windows that begin `early` samples earlier."""

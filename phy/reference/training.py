@@ -62,7 +62,8 @@ def learn(
     expected = float(np.sum(np.abs(before.h) ** 2)) * len(ratio)
     amplitude = np.ones(len(y))
     if seen > 0:
-        strength = expected / seen
+        # The gains may have been scaled to the header.
+        strength = expected / seen / before.scaled
         if abs(1 / strength - 1) > SURELY * np.sqrt(0.5 * before.no / expected):
             amplitude[:n_training] = np.clip(strength, 1 / LARGEST_BOOST, LARGEST_BOOST)
     return estimate(y, sent, amplitude, grid)

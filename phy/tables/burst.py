@@ -51,12 +51,14 @@ class Axes(NamedTuple):
     """Position of each bit of the code's order in a symbol whose bits lie plane by plane."""
 
 
-@block_of("f4[2] f4[2] f4[2] f4[2] f4[1] f4[2] f4[1] f8[1] f8[1] f8[1] f8[2]")
+@block_of("f4[2] f4[2] f4[2] f4[2] f4[2] f4[1] f4[2] f4[1] f8[2] f8[1] f8[1] f8[2] f8[2]")
 class Channel(NamedTuple):
     """What is known of a burst's channel; it is updated during the burst."""
 
     h: Planes
     """Gains `[2, width]`, in the order of `Tones`."""
+    speed: Planes
+    """Change of the gains from symbol to symbol `[2, width]`."""
     centre: Planes
     """Factors that rotate gains back by their mean delay `[2, width]`."""
     turns: Planes
@@ -69,12 +71,18 @@ class Channel(NamedTuple):
     masses: Row
     """Over the symbols since the last correction, Σ y (E s)* `[2, width]`, Σ E |s|² `[width]`."""
     unknown: NDArray[np.float64]
+    """For each group of the smoother, what is not known of gain and speed `[3, groups + 1]`.
+
+    Variance of a gain, covariance, variance of a speed, per dimension; see `phy.kernels.smoothing`.
+    """
     power: NDArray[np.float64]
-    """Mean power of each group of the smoother `[groups + 1]`; see `phy.kernels.smoothing`."""
+    """Mean power of each group `[groups + 1]`, per dimension."""
     figures: NDArray[np.float64]
     """Scalar values; their indices are defined below."""
     tracking: NDArray[np.float64]
     """State of both tracking filters `[2, 5]`; see `phy.kernels.tracking`."""
+    missed: NDArray[np.float64]
+    """By how much the last symbol's pilots were not as expected `[2, n_pilots]`."""
 
     @property
     def no(self) -> float:
@@ -90,13 +98,20 @@ class Channel(NamedTuple):
 PHASE, SLOPE = 0, 1
 """Rows of `tracking`: the phase common to all tones, and its slope over them."""
 
-N_FIGURES = 7
-NO, GAIN, DELAY, DRIFT, N_HEARD, CERTAIN, SLOPE_USED = range(N_FIGURES)
+N_FIGURES = 13
+NO, GAIN, DELAY, DRIFT, N_HEARD, CERTAIN, WRONG, SLOPE_USED, DOUBT, DUE, MOVES, SPREAD, SCALED = (
+    range(N_FIGURES)
+)
 """Of `figures`: noise on a subcarrier, mean |h|², phase a subcarrier, drift; symbols since a
-correction and what was certain in them, Σ |E s|²; the slope that subcarriers are turned back by."""
+correction, what was certain in them, Σ |E s|², and what was not, Σ |h|² (E|s|² − |E s|²); the slope
+that subcarriers are turned back by; mean variance of the gains; symbols from one correction to the
+next; whether gains have a speed; variance of the common amplitude (0 until a step of it); its steps
+since the estimate, as one."""
 
 
-@block_of("f4[2] i8[1] f4[2] f4[1] f4[3] f4[2] f4[1] i2[1] c16[1] f8[1] f4[2] f4[2] f8[1] f8[1]")
+@block_of(
+    "f4[2] i8[1] f4[2] f4[1] f4[3] f4[2] f4[1] i2[1] c16[1] f8[1] f4[2] f4[2] f4[2] f8[1] f8[2]"
+)
 class Scratch(NamedTuple):
     """Working memory of the receiver's kernels; one per thread."""
 
@@ -120,7 +135,11 @@ class Scratch(NamedTuple):
     pilot_power: NDArray[np.float64]
     """The pilots in the form that tracking takes `[n_pilots]`."""
     rest: Planes
+    joined: Planes
     coefficients: NDArray[np.float32]
     energies: NDArray[np.float64]
     weights: NDArray[np.float64]
-    """Room of the smoother `[2, width]`, `[2, rows of the basis]`, `[groups + 1]` twice."""
+    """Room of the smoother.
+
+    Twice `[2, width]`, then `[2, rows of the basis]`, `[groups + 1]`, `[2, groups + 1]`.
+    """

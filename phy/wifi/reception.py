@@ -16,7 +16,7 @@ from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.numerology import OFDM_64_16
 from phy.tables.acquisition import BACKOFF
 from phy.tables.block import ArgumentBlock
-from phy.tables.burst import Channel
+from phy.tables.burst import DUE, Channel
 from phy.wifi.bits import Rate, Signal, has_right_fcs, parse_data, parse_signal
 from phy.wifi.high_throughput import HT_SIG_SYMBOLS, HtSignal, parse_ht_signal
 
@@ -140,8 +140,9 @@ def _ht_signal(
     """The HT-SIG field from symbol `first_symbol` after the training on, or None."""
     points = np.zeros((HT_SIG_SYMBOLS, _GRID.n_data), np.complex64)
     begin = signal_window + first_symbol * _GRID.n_symbol
-    # A separate channel, so that these points do not affect the estimate.
+    # A separate channel, so that these points do not affect the estimate. They are not decided.
     channel = _channel(samples, window, frequency)
+    channel.content.figures[DUE] = np.inf
     llr = _llrs(
         samples, window, begin, HT_SIG_SYMBOLS, frequency, channel, Modulation.BPSK, first_symbol,
         points,

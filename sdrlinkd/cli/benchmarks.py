@@ -40,6 +40,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         "SNR that the modem needs, with the impairments of real radios.", 15,
         peers=("libliquid-dev", "gcc", "gnuradio"),
     ),
+    "rough": Benchmark("The modem in motion, on a busy air, and through steps of gain.", 6),
     "phy_speed": Benchmark(
         "Samples per second on one core, transmit and receive.", 2,
         peers=("libliquid-dev", "gcc", "gnuradio"),

@@ -5,10 +5,12 @@ import pytest
 
 from phy import OFDM_64_16, Modulation, points
 from phy.kernels import equalise, start_tracking
-from phy.reference import equaliser
+from phy.reference import channel as reference_channel
 from phy.testing import (
+    DUE,
     GAIN,
     NO,
+    SCALED,
     axes,
     convolutional,
     in_planes,
@@ -24,7 +26,7 @@ from tests.laws import one_in
 
 SEED = 17
 GRID = OFDM_64_16
-BLOCK = equaliser.BLOCK
+BLOCK = reference_channel.LONGEST
 MAX_LLR = convolutional.MAX_LLR
 N_SYMBOLS = BLOCK  # After so many, the channel is corrected by what was decided.
 SCALE = 8  # LLRs are in eighths
@@ -40,6 +42,7 @@ def channel_of(h, no):
     channel.centre[0] = 1
     channel.figures[[NO, GAIN]] = no, np.mean(np.abs(h) ** 2)
     channel.power[:] = channel.gain
+    channel.figures[[DUE, SCALED]] = BLOCK, 1
     start_tracking(tones(GRID).content, channel, 0.0, False)
     return block
 
@@ -247,7 +250,7 @@ def test_a_channel_that_stands_still_becomes_known_better(modulation, no):
     _, bins = faded_symbols(modulation, np.repeat(h[None, :], 200, axis=0), no, rng)
     noise = rng.standard_normal((GRID.n_used, 2)) @ [1, 1j]
     channel = channel_of(h + noise * np.sqrt(no / 8), no)
-    channel.content.unknown[:] = no / 4
+    channel.content.unknown[0] = no / 4
     before = error_of(channel, h)
     demap(modulation, bins, channel)
     assert error_of(channel, h) < before / 2

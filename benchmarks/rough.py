@@ -1,0 +1,178 @@
+"""The modem in rough air: joined in mid-stream, after strong signals, in motion, through steps.
+
+Bursts are impaired as `benchmarks.trials` says. A share of lost PDUs meets its target if its upper
+95 % bound does; with --quick, the share itself.
+"""
+
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.report import Row, exactly, main
+from benchmarks.trials import Air, ErrorRate, bursts, lost_of
+from phy import SENSE_WINDOW, EnergyDetector, PduHeard, Receiver, Transmitter
+
+QPSK12, QAM64_34 = 1, 6
+SNR_DB = 25.0
+# Rate, Doppler, PDUs of a burst and their octets, largest share lost. A burst of 5 PDUs of 64 B
+# lasts 5 ms, the longest by default.
+_MOVING = (
+    (5e6, 100.0, 1, 1500, 0.02),
+    (5e6, 200.0, 1, 1500, 0.06),
+    (1e6, 40.0, 1, 220, 0.005),
+    (1e6, 100.0, 1, 220, 0.04),
+    (1e6, 40.0, 5, 64, 0.01),
+    (1e6, 40.0, 4, 220, 0.02),
+)
+_PATIENCE_S = 0.04
+"""As the modem of a daemon has it."""
+
+
+def measure(seed: int, quick: bool) -> Iterator[Row]:
+    """Measure all rows."""
+    yield from exactly(_rows(seed, quick))
+
+
+def _rows(seed: int, quick: bool) -> Iterator[Row]:
+    for snr_db in (8.0, 25.0):
+        for gap in (32, 200, 1000):
+            yield _joined(gap, snr_db, seed, 30 if quick else 300)
+    for rate_hz in (1e6, 5e6):
+        yield _deaf_receiver(rate_hz, seed)
+        yield _deaf_carrier_sense(rate_hz, seed)
+    for place in _MOVING:
+        yield _moving(*place, seed, quick)
+    for step_db in (-3.0, -6.0):
+        yield _step(step_db, seed, quick)
+    yield _false_pdus(seed, 10**6 if quick else 10**8)
+
+
+def _noise(rng: np.random.Generator, n: int, power: float = 1.0) -> NDArray[np.complex64]:
+    parts = rng.standard_normal((n, 2), np.float32) * np.float32(np.sqrt(power / 2))
+    return parts.view(np.complex64)[:, 0]
+
+
+def _heard(receiver: Receiver, x: NDArray[np.complex64]) -> set[bytes]:
+    events = receiver.push(x) + receiver.flush()
+    return {event.data for event in events if isinstance(event, PduHeard)}
+
+
+def _joined(gap: int, snr_db: float, seed: int, n: int) -> Row:
+    """Receivers that begin anywhere in a stream of bursts, each `gap` samples after the last."""
+    rng, transmitter = np.random.default_rng(seed), Transmitter()
+    pdus = [[rng.bytes(220) for _ in range(4)] for _ in range(8)]
+    parts = [transmitter.modulate(each, QPSK12) for each in pdus]
+    begins = np.cumsum([0, *(len(part) + gap for part in parts[:-1])])
+    x = np.concatenate([np.pad(part, (0, gap)) for part in parts])
+    heard = sent = 0
+    for start in rng.integers(0, begins[-3], n):
+        got = _heard(Receiver(), (x + _noise(rng, len(x), 10 ** (-snr_db / 10)))[start:])
+        # The first whole burst may be missed, whose preamble may come too soon.
+        due = pdus[int(np.searchsorted(begins, start)) + 1 :]
+        sent += 4 * len(due)
+        heard += len(got & {pdu for each in due for pdu in each})
+    name = f"joined_mid_stream_heard_gap{gap}_{snr_db:.0f}db"
+    return Row(name, heard / sent, "share", 0.99, "more", n, note=f"{heard} of {sent} PDUs")
+
+
+def _deaf_receiver(rate_hz: float, seed: int) -> Row:
+    """How long after a strong signal a receiver still misses bursts, at the worst."""
+    rng, transmitter = np.random.default_rng(seed), Transmitter()
+    worst = 0.0
+    for level_db in (10, 30, 60):
+        receiver = Receiver()
+        receiver.push(_noise(rng, 1 << 22, 0.01))
+        receiver.push(_noise(rng, 1 << 22, 0.01 * 10 ** (level_db / 10)))
+        end = receiver.next_index
+        for _ in range(1000):
+            burst = transmitter.modulate([rng.bytes(64)], QPSK12)
+            x = np.concatenate((np.zeros(64), burst)).astype(np.complex64)
+            begin = receiver.next_index + 64
+            events = receiver.push(x + _noise(rng, len(x), 0.01))
+            events += receiver.push(_noise(rng, 1024, 0.01))
+            if any(isinstance(event, PduHeard) for event in events):
+                worst = max(worst, (begin - end) / rate_hz)
+                break
+        else:
+            worst = np.inf
+    name = f"deaf_after_strong_signal_ms_receiver_{rate_hz * 1e-6:.0f}msps"
+    return Row(name, 1e3 * worst, "ms", 5, "less", 3, note="+10, +30, +60 dB for 4 million samples")
+
+
+def _deaf_carrier_sense(rate_hz: float, seed: int) -> Row:
+    """How long a robot that senses the air is quiet: signals that stay, levels that change."""
+    rng, second = np.random.default_rng(seed), int(rate_hz)
+    worst = 0.0
+    for before, after in ((1.0, 100.0), (1e4, 1.0), (0.0, 1.0), (1e-6, 1.0), (1.0, 1e3)):
+        sense = EnergyDetector(patience=round(_PATIENCE_S * rate_hz))
+        sense.push(_noise(rng, second, before))
+        changed = sense.next_index
+        sense.push(_noise(rng, second, after))
+        worst = max(worst, sense.busy_until - changed)
+    name = f"deaf_after_strong_signal_ms_carrier_sense_{rate_hz * 1e-6:.0f}msps"
+    note = "a signal stays, ends, begins in silence; the gain rises"
+    return Row(name, 1e3 * max(worst, SENSE_WINDOW) / rate_hz, "ms", 50, "less", 5, note=note)
+
+
+def _moving(
+    rate_hz: float, doppler_hz: float, n_pdus: int, n_bytes: int, target: float, seed: int,
+    quick: bool,
+) -> Row:  # fmt: skip
+    air = Air(rate_hz=rate_hz, profile="tdl-a", doppler_hz=doppler_hz)
+    stream = bursts(air, QPSK12, n_bytes, SNR_DB, seed, n_pdus)
+    n = 300 if quick else 3000
+    lost = lost_of(air, stream, n, n * n_pdus)
+    name = f"doppler_{doppler_hz:.0f}hz_{n_pdus}x{n_bytes}B_{rate_hz * 1e-6:.0f}msps_lost"
+    return _lost(name, lost, target, "TDL-A 100 ns, 25 dB, QPSK 1/2, each burst whole", quick)
+
+
+def _step(step_db: float, seed: int, quick: bool) -> Row:
+    """Bursts of four PDUs with a step of gain anywhere in the payload."""
+    rng, transmitter, receiver = np.random.default_rng(seed), Transmitter(), Receiver()
+    errors, n = 0, 300 if quick else 3000
+    for _ in range(n):
+        pdus = [rng.bytes(220) for _ in range(4)]
+        burst = transmitter.modulate(pdus, QAM64_34).copy()
+        burst[int(rng.integers(600, len(burst) - 200)) :] *= np.float32(10 ** (step_db / 20))
+        x = np.pad(burst, (300, 1000))
+        events = receiver.push(x + _noise(rng, len(x), 10 ** (-SNR_DB / 10)))
+        errors += len(set(pdus) - {each.data for each in events if isinstance(each, PduHeard)})
+    name = f"gain_step_64qam_{step_db:.0f}db_lost"
+    note = "64QAM 3/4, 4 x 220 B, 25 dB before"
+    return _lost(name, ErrorRate(4 * n, errors), 0.01, note, quick)
+
+
+def _lost(name: str, lost: ErrorRate, target: float, note: str, quick: bool) -> Row:
+    note = f"{lost.errors} of {lost.n} lost; {note}"
+    value = lost.share if quick else lost.bound
+    return Row(name, value, "share", target, "less", lost.n, note=note)
+
+
+def _false_pdus(seed: int, n_samples: int) -> Row:
+    """Whatever a radio may bring but bursts: how often it is taken for a PDU."""
+    rng, receiver, told = np.random.default_rng(seed), Receiver(), 0
+    block = 1 << 16
+    while receiver.counters["samples"] < n_samples:
+        x = _noise(rng, block, 10 ** rng.uniform(-6, 6)).copy()
+        kind, at = rng.integers(6), int(rng.integers(block))
+        if kind == 0:
+            x[:] = 0
+        elif kind == 1:
+            np.clip(x.view(np.float32), -0.1, 0.1, out=x.view(np.float32))
+        elif kind == 2:
+            x[at:] *= np.float32(10 ** rng.uniform(-3, 3))
+        elif kind == 3:
+            x[at:] += np.complex64(10 ** rng.uniform(-3, 3))
+        elif kind == 4:
+            turn = np.exp(2j * np.pi * rng.uniform(-0.5, 0.5) * np.arange(block - at))
+            x[at:] += (turn * 10 ** rng.uniform(-3, 3)).astype(np.complex64)
+        told += sum(isinstance(event, PduHeard) for event in receiver.push(x))
+    note = "silence, saturation, steps of level and DC, carriers, noise"
+    n = receiver.counters["samples"]
+    return Row("false_pdus", told, "PDUs", 0, "less", n, note=note)
+
+
+if __name__ == "__main__":
+    sys.exit(main("rough", measure))
