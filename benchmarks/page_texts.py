@@ -84,8 +84,7 @@ TEXTS = {
         "The modem where the air is not still: receivers that begin within a burst, after strong "
         "signals, robots in motion (40 Hz is 5 m/s at 2.4 GHz), steps of gain. Shares of lost PDUs "
         "are upper 95 % bounds. A robot that senses the carrier believes in energy that no header "
-        "explains for 40 ms. Before, none of the rows met its target: `joined_...` heard nothing "
-        "with a gap of 32, 15 to 79 % were lost in motion, and 60 % behind a step."
+        "explains for 40 ms."
     ),
     "phy_speed": (
         "Samples a second that one core's CPU time carries. In brackets the value scaled by how"

@@ -25,7 +25,7 @@ GRID = OFDM_64_16
 )
 @pytest.mark.slow
 def test_pdus_are_heard_while_the_channel_moves(rate_hz, doppler_hz, n_pdus, size, n, most):
-    """In 3 to 5 times the share of losses seen in many; before, 15 to 79 % were lost."""
+    """Several times the share that `benchmarks.rough` measures with many bursts is allowed."""
     air = Air(rate_hz=rate_hz, profile="tdl-a", doppler_hz=doppler_hz)
     lost = lost_of(air, bursts(air, 1, size, 25.0, SEED, n_pdus), n, n * n_pdus)
     assert lost.share <= most, lost
