@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from sdrlinkd.adapters.fields import cdr_from_fields
 from sdrlinkd.adapters.stops import begins_with_header, stop_messages
-from sdrlinkd.adapters.typestore import knows
+from sdrlinkd.adapters.typestore import knows, ros2_types
 from sdrlinkd.config import Setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import HeardTopic
@@ -23,6 +23,8 @@ class MessageTypes:
         self._stops: Mapping[int, bytes] = stop_messages(setup)
         self._table = setup.table
         self._headers: dict[str, bool] = {}
+        # The first message would otherwise wait for this, and with it the whole event loop.
+        ros2_types()
 
     def has_header(self, kind: str) -> bool:
         """Whether messages of type `kind` begin with a std_msgs/Header; False if unknown."""

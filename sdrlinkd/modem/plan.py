@@ -2,7 +2,7 @@
 
 from backends import GAP, TxWindows
 
-EASE = 64
+EASE = 512
 """Number of bursts in time after which most of an increase of the lead has decayed."""
 
 

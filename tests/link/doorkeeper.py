@@ -11,6 +11,7 @@ class Doorkeeper:
 
     state = "kept"
     pause_s = 0.0
+    share = 1.0
     others_follow = False
     keeps_schedule = False
     by_request = by_auction = None

@@ -123,12 +123,13 @@ def test_a_message_that_does_not_come_is_reckoned_with_and_then_forgotten():
     assert forecasts.next_due(due_at + 4 * PERIOD_S, Qos.BULK) is None
 
 
-def allow(forecasts, start, longest_s=0.1, **params):
+def allow(forecasts, start, longest_s=0.1, has_slots=False, **params):
     classes = ClassesParams(bulk=ClassParams(**params))
     limits = Limits(classes, forecasts)
     return limits.allow(
-        start, longest_s, lambda n: airtime_s(0, n), lambda s: int(s / PDU_S + 1e-6), 0.0, 0.0
-    )
+        start, longest_s, lambda n: airtime_s(0, n), lambda s: int(s / PDU_S + 1e-6), 0.0, 0.0,
+        has_slots=has_slots,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("before_s", [0.0155, 0.0101, 0.0032, 0.0012])
@@ -144,6 +145,14 @@ def test_when_no_pdu_fits_before_what_is_due_the_air_is_kept_free():
     allowance = allow(forecasts, due_at - 0.3 * PDU_S)
     assert allowance.most[Qos.BULK] == 0
     assert due_at < allowance.until < due_at + PDU_S
+
+
+@pytest.mark.parametrize("before_s", [0.0155, 0.0032, 0.3 * PDU_S, 0.0])
+def test_in_slots_of_ones_own_only_the_cap_of_the_class_shortens_a_burst(before_s):
+    forecasts, due_at = learned()
+    assert allow(forecasts, due_at - before_s, has_slots=True).most == (100,) * 4
+    capped = allow(forecasts, due_at - before_s, has_slots=True, max_burst_s=0.003)
+    assert capped.most == (100, 100, 100, 3)
 
 
 def test_nothing_is_waited_for_whose_time_is_over():

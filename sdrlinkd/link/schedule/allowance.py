@@ -81,11 +81,15 @@ class Limits:
         notice_s: float,
         is_shared: bool = False,
         asked: Collection[Qos] = tuple(Qos),
+        *,
+        has_slots: bool = False,
     ) -> Allowance:
         """The allowance for a burst that leaves at `start` and is at most `longest_s` long.
 
         A message can leave `ready_s` after it is due, at the earliest, and is noticed up to
-        `notice_s` after it was made. Classes not in `asked` get no PDU.
+        `notice_s` after it was made. Classes not in `asked` get no PDU. `has_slots`: this robot may
+        send only in slots of its own, so what it keeps free is lost until the next one, for what is
+        due as well: then nothing is kept free.
         """
         forecasts = self._forecasts
         overrun = SHARED_OVERRUN if is_shared else OVERRUN
@@ -104,10 +108,10 @@ class Limits:
                 most.append(most_pdus(longest_s))
                 continue
             cap_s = longest_s
-            if forecasts.is_unforeseen(known, qos, ALIVE_S):
+            if has_slots or forecasts.is_unforeseen(known, qos, ALIVE_S):
                 cap_s = min(cap_s, max(self._cap_s[qos], airtime_s(1)))
             n = most_pdus(cap_s)
-            due = forecasts.next_due(known, qos)
+            due = None if has_slots else forecasts.next_due(known, qos)
             if due is not None and n:
                 free_s = due.due(known) - due.spread_s + ready_s - start
                 n = self._before(free_s, 2 * due.spread_s + notice_s, n, airtime_s, overrun)

@@ -507,6 +507,7 @@ class BurstScheduler:
                 fit.notice_s,
                 access.others_follow,
                 asked,
+                has_slots=access.share < 1,
             )
         if self._bids is not None:
             # The others have left the air to us, and wait for a burst.
