@@ -69,7 +69,7 @@ def compile_kernels(target: Target, to: Path, progress: Progress | None = None) 
     """Compile the kernels for `target` into the object file `to`. Raises BuildError."""
     settings = {**os.environ, **_SETTINGS, "NUMBA_CACHE_DIR": str(to.parent)}
     settings["PYTHONPATH"] = os.pathsep.join((str(_ROOT), os.environ.get("PYTHONPATH", "")))
-    command = [sys.executable, "-m", "phy.engine", target.name, str(to), str(os.getpid())]
+    command = [sys.executable, "-P", "-m", "phy.engine", target.name, str(to), str(os.getpid())]
     errors = to.with_name("errors")
     with (
         errors.open("w") as stderr,

@@ -137,14 +137,13 @@ def _pilots(
 def _data(
     re: Row, im: Row, c: float, s: float, trust: float, belief: float, axes: Axes,
     channel: Channel, scratch: Scratch, n: int,
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float]:  # fmt: skip
     """Convert a symbol's `n` data subcarriers to levels, and to LLRs plane by plane.
 
     The subcarriers are rotated by c + js and by the slope in use. Their certainty is `belief` times
     that of the gains. With their likely values, they are added to the channel's sums and masses,
     times `trust`. Returns the certain part of them, Σ |E s|² times `trust`, and what wrong ones
-    contribute: Σ |h|² (E|s|² − |E s|²), likewise, in units of LLRs; and how far points are from
-    those decided, as a share of the noise.
+    contribute: Σ |h|² (E|s|² − |E s|²), likewise, in units of LLRs.
     """
     width = channel.masses.size
     turns, inverse, sums = channel.turns, channel.inverse, channel.sums
@@ -156,7 +155,6 @@ def _data(
     by = splat(unit * trust)
     certain: Lanes = splat(0)
     wrong: Lanes = splat(0)
-    off: Lanes = splat(0)
     for d in range(0, n, N_LANES):
         a, b = load(re, d), load(im, d)
         a, b = a * cos - b * sin, a * sin + b * cos
@@ -180,10 +178,28 @@ def _data(
         mean = mean_re * mean_re + mean_im * mean_im
         certain = certain + mean
         wrong = wrong + load(certainty, d) * (square - mean)
-        off_re, off_im = level_re - mean_re, level_im - mean_im
+    size = unit * unit * trust
+    return float(total(certain)) * size, float(total(wrong)) * size
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _off(
+    re: Row, im: Row, c: float, s: float, belief: float, axes: Axes, channel: Channel,
+    scratch: Scratch, n: int,
+) -> float:  # fmt: skip
+    """How far a symbol's points are from those decided, as a share of the noise; see `_data`."""
+    _data(re, im, c, s, 0.0, belief, axes, channel, scratch, n)
+    level, llr, certainty, width = scratch.level, scratch.llr, channel.certainty, re.size
+    real_bits, imag_bits, unit = axes.real_bits, axes.imag_bits, axes.unit
+    off: Lanes = splat(0)
+    for d in range(0, n, N_LANES):
+        mean_re, _ = expected_level(llr, real_bits, d, n)
+        mean_im: Lanes = splat(0)
+        if imag_bits:
+            mean_im, _ = expected_level(llr, imag_bits, real_bits * n + d, n)
+        off_re, off_im = load(level, d) - mean_re, load(level, width + d) - mean_im
         off = off + load(certainty, d) * (off_re * off_re + off_im * off_im)
-    size, share = unit * unit * trust, unit * unit / (LLR_SCALE * n)
-    return float(total(certain)) * size, float(total(wrong)) * size, float(total(off)) * share
+    return float(total(off)) * unit * unit / (LLR_SCALE * n)
 
 
 @step
@@ -263,11 +279,11 @@ def equalise(
         c, s = math.cos(phase), -math.sin(phase)
         if amplitude != 1.0:
             # Pilots of another burst may look like a step of gain; its data do not.
-            _, _, off = _data(re, im, c, s, 0.0, belief, axes, channel, scratch, n_data)
+            off = _off(re, im, c, s, belief, axes, channel, scratch, n_data)
             if off > NO_STEP:
                 no = off * _noise(channel)
                 trust, belief = 1 / off, _noise(channel) / (no + figures[DOUBT])
-        certain, wrong, _ = _data(re, im, c, s, trust, belief, axes, channel, scratch, n_data)
+        certain, wrong = _data(re, im, c, s, trust, belief, axes, channel, scratch, n_data)
         if points.shape[0]:
             for d in range(n_data):
                 re_level, im_level = scratch.level[0, d], scratch.level[1, d]

@@ -27,6 +27,7 @@ from phy.tables.burst import (
     DUE,
     MOVES,
     NO,
+    PHASE,
     SCALED,
     SPREAD,
     Channel,
@@ -291,11 +292,13 @@ def follow(
             n_noise += _size(group, tones)
     # What is there where nothing was found, is noise that the preamble did not have.
     variance = max(variance, noise / n_noise)
+    # Nor is it movement if the phase is wrong by which symbols were turned back.
+    jitter = channel.tracking[PHASE, 2]
     excess, chance, whole = 0.0, 0.0, 0.0
     for group in range(last):
         if power[group] > 0:
             size = _size(group, tones)
-            expected = variance + unknown[0, group]
+            expected = variance + jitter * power[group] + unknown[0, group]
             excess += energies[group] - size * expected
             chance += size * expected * expected
             whole += size * power[group]
@@ -327,11 +330,31 @@ def follow(
         add(channel.speed, error)
         figures[MOVES] = 1
         _grow(whole, channel)
-        _turn(whole, channel)
-        if _is_still(variance * n, tones, channel):
+        turning = _turning(channel)
+        _turn(whole, turning, channel)
+        if _is_still(variance * n, turning, tones, channel):
+            # The phase's filter must go on alone, so it no longer turns against the gains.
+            channel.tracking[PHASE, 1] += turning
             stand_still(channel)
     _sum_doubt(tones, channel)
     figures[DUE] = _next(variance * n, tones, channel)
+
+
+@step
+def _turning(channel: Channel) -> float:
+    """By how many radians a symbol the speeds turn all gains alike."""
+    h, speed, width = channel.h, channel.speed, channel.masses.size
+    turning: Lanes = splat(0)
+    for k in range(0, width, N_LANES):
+        re, im = load(h, k), load(h, width + k)
+        turning = turning + (re * load(speed, width + k) - im * load(speed, k))
+    return float(total(turning)) / max(_power(h), 1e-30)
+
+
+@step
+def _own_speed(turning: float, channel: Channel) -> float:
+    """The power of the speeds without that `turning`, which is a phase's and no movement."""
+    return max(0.0, _power(channel.speed) - turning * turning * _power(channel.h))
 
 
 @step
@@ -344,13 +367,14 @@ def _grow(whole: float, channel: Channel) -> None:
 
 
 @step
-def _turn(whole: float, channel: Channel) -> None:
+def _turn(whole: float, turning: float, channel: Channel) -> None:
     """Let the drift be at least what turns such speeds, if all echoes have the same Doppler.
 
     A gain of mean power 1 that turns by w radians a symbol has the mean square speed w² / 2, and
     the speed changes by 3 w⁴ / 8 (Jakes).
     """
-    share = _power(channel.speed) / whole if whole > 0 else 0.0
+    speed = _own_speed(turning, channel)
+    share = speed / whole if whole > 0 else 0.0
     channel.figures[DRIFT] = max(channel.figures[DRIFT], _TURNING * 1.5 * share * share)
 
 
@@ -364,9 +388,9 @@ def _power(x: Planes) -> float:
 
 
 @step
-def _is_still(noise: float, tones: Tones, channel: Channel) -> bool:
+def _is_still(noise: float, turning: float, tones: Tones, channel: Channel) -> bool:
     """Whether the gains will have moved by little beside the noise, far from now."""
-    speed = _power(channel.speed)
+    speed = _own_speed(turning, channel)
     for group in range(channel.power.size):
         drift = channel.figures[DRIFT] * channel.power[group] * _FAR / 3
         speed += _size(group, tones) * (channel.unknown[2, group] + drift)

@@ -90,7 +90,7 @@ def correct(
     size = math.sqrt(total.real * total.real + total.imag * total.imag)
     if size == 0.0 or expected <= 0.0:
         return no, 0.0, 1.0, False
-    common, more = (total / size).conjugate(), size / expected - 1
+    common, more = complex(total.real / size, -total.imag / size), size / expected - 1
     variance = (no + doubt) / (2 * expected)
     if abs(more) > LEAST_STEP and more * more > STEP * STEP * (variance + spread):
         spread = 1.0
@@ -109,14 +109,13 @@ def correct(
         t0 += theta
         t1 += theta * k
         if weight > 0.0:
-            h = math.sqrt(weight)
-            error = turned[p] / h - h
-            whole += error.real * error.real + error.imag * error.imag
-            error = aligned / h - amplitude * h
-            residual += error.real * error.real + error.imag * error.imag
-            re, im = error.real - missed[0, p], error.imag - missed[1, p]
-            change += re * re + im * im
-            missed[0, p], missed[1, p] = error.real, error.imag
+            share, re, im = 1 / weight, turned[p].real - weight, turned[p].imag
+            whole += share * (re * re + im * im)
+            re = aligned.real - amplitude * weight
+            residual += share * (re * re + theta * theta)
+            more_re, more_im = re - missed[0, p], theta - missed[1, p]
+            change += share * (more_re * more_re + more_im * more_im)
+            missed[0, p], missed[1, p] = re, theta
     differ = whole > DIFFER * (n * (no + doubt) + tracking[PHASE, 2] * expected)
     foreign = min(residual, change - n * no)
     movement = 0.0

@@ -165,7 +165,7 @@ class Equaliser:
         if mass > LEAST_MASS:
             error = (self._sums - channel.h * self._masses) / mass
             noise = channel.noise + max(0.0, self._wrong) / self._certain
-            follow(error, noise / mass, self._n_heard, channel, self._grid)
+            follow(error, noise / mass, self._n_heard, self.tracking.phase, channel, self._grid)
         self._forget_block()
 
     def _forget_block(self) -> None:

@@ -12,6 +12,9 @@ from phy.numerology import Numerology
 Samples = NDArray[np.complex128]
 Subcarriers = NDArray[np.complex128]
 
+ROUNDS = 2
+"""After so many, a symbol's amplitude is right to within half a per cent."""
+
 
 def to_samples(subcarriers: Subcarriers, grid: Numerology, peak: float = np.inf) -> Samples:
     """Convert symbols `[n, n_used]` to samples `[n · n_symbol]`, mean power 1, none beyond `peak`.
@@ -20,13 +23,18 @@ def to_samples(subcarriers: Subcarriers, grid: Numerology, peak: float = np.inf)
 
     Subcarriers are in the order of `grid.used`. A sample beyond `peak` is clipped to that
     magnitude: the error of −34 dB and less is below the noise at which the MCS works (`phy.mcs`).
+    What that takes of a symbol's amplitude is given back to the whole symbol. Else its gain would
+    be that of a channel that fades for one symbol.
     """
     spectrum = np.zeros((len(subcarriers), grid.n_fft), np.complex128)
     spectrum[:, grid.bins] = subcarriers
     # NumPy's inverse FFT divides by 64; `scale` is 64/√52.
     body = np.fft.ifft(spectrum) * grid.scale
-    size = np.maximum(np.abs(body), 1e-30)
-    body = body * np.minimum(1, peak / size)
+    size, kept = np.maximum(np.abs(body), 1e-30), np.ones((len(body), 1))
+    for _ in range(ROUNDS):
+        left = np.minimum(1, peak * kept / size)
+        kept = np.sum(left * size**2, axis=1, keepdims=True) / np.sum(size**2, 1, keepdims=True)
+    body = body * np.minimum(1, peak * kept / size) / kept
     return np.concatenate((body[:, -grid.n_cp :], body), axis=1).reshape(-1)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from phy.numerology import Numerology
 from phy.reference.channel import LONGEST, Channel
 from phy.reference.ofdm import Subcarriers
+from phy.reference.tracking import Kalman
 
 GROUPS = ((0,), (1,), (2, 3), (4, 5, 6, 7, 8))
 """Delays of each group's echoes from the mean delay; one more group has all up to a prefix."""
@@ -164,7 +165,9 @@ def scale(amplitude: float, channel: Channel) -> None:
     channel.scaled *= amplitude
 
 
-def follow(error: Subcarriers, variance: float, n: int, channel: Channel, grid: Numerology) -> None:
+def follow(
+    error: Subcarriers, variance: float, n: int, phase: Kalman, channel: Channel, grid: Numerology
+) -> None:
     """Move the channel towards the last `n` symbols, which deviate from it by `error` `[n_used]`.
 
         Ĥ += a / (a + v) · error;  speed += b / (a + v) · error
@@ -179,7 +182,8 @@ def follow(error: Subcarriers, variance: float, n: int, channel: Channel, grid: 
     # The last group is of no channel. What is there, and where nothing was found, is noise.
     found[-1] = False
     variance = max(variance, float(e[-1] / np.sum(m[~found])))
-    expected = variance + channel.unknown[0]
+    # Nor is it movement if the phase is wrong by which symbols were turned back.
+    expected = variance + phase.covariance[0] * power + channel.unknown[0]
     excess = np.sum((e - m * expected)[found])
     chance = np.sqrt(np.sum((m * expected**2)[found]))
     whole, more = float(np.sum((m * power)[found])), 0.0
@@ -199,8 +203,11 @@ def follow(error: Subcarriers, variance: float, n: int, channel: Channel, grid: 
         channel.moves = True
         channel.speed = channel.speed + centred(rate @ parts, -channel.delay, grid)
         _grow(whole, channel)
-        _turn(whole, channel)
-        if _is_still(variance * n, channel, grid):
+        turning = _turning(channel)
+        _turn(whole, turning, channel)
+        if _is_still(variance * n, turning, channel, grid):
+            # The phase's filter must go on alone, so it no longer turns against the gains.
+            phase.rate += turning
             channel.moves, channel.drift = False, 0.0
             channel.speed = np.zeros(grid.n_used, np.complex128)
             channel.unknown[1:] = 0
@@ -215,20 +222,32 @@ def _grow(whole: float, channel: Channel) -> None:
         channel.power = channel.power * (power / whole)
 
 
-def _turn(whole: float, channel: Channel) -> None:
+def _turn(whole: float, turning: float, channel: Channel) -> None:
     """Let the drift be at least what turns such speeds, if all echoes have the same Doppler.
 
     A gain of mean power 1 that turns by w radians a symbol has the mean square speed w² / 2, and
     the speed changes by 3 w⁴ / 8 (Jakes).
     """
-    share = float(np.sum(np.abs(channel.speed) ** 2)) / whole if whole > 0 else 0.0
+    share = _own_speed(turning, channel) / whole if whole > 0 else 0.0
     channel.drift = max(channel.drift, TURNING * 1.5 * share**2)
 
 
-def _is_still(noise: float, channel: Channel, grid: Numerology) -> bool:
+def _turning(channel: Channel) -> float:
+    """By how many radians a symbol the speeds turn all gains alike."""
+    along = float(np.sum(channel.h.conj() * channel.speed).imag)
+    return along / max(float(np.sum(np.abs(channel.h) ** 2)), 1e-30)
+
+
+def _own_speed(turning: float, channel: Channel) -> float:
+    """The power of the speeds without that `turning`, which is a phase's and no movement."""
+    whole, power = (float(np.sum(np.abs(x) ** 2)) for x in (channel.speed, channel.h))
+    return max(0.0, whole - turning**2 * power)
+
+
+def _is_still(noise: float, turning: float, channel: Channel, grid: Numerology) -> bool:
     """Whether the gains will have moved by little beside the noise, far from now."""
     c = channel.unknown[2] + channel.drift * channel.power * FAR / 3
-    speed = np.sum(np.abs(channel.speed) ** 2) + np.sum(sizes(grid) * c)
+    speed = _own_speed(turning, channel) + np.sum(sizes(grid) * c)
     return bool(speed * FAR**2 < LITTLE * noise * grid.n_used)
 
 

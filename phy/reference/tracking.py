@@ -158,14 +158,12 @@ class Tracking:
         # First the common phase; then the remaining angles are small: arg z ≈ Im z/|z|.
         common = cmath.phase(total)
         aligned = turned * cmath.exp(-1j * common)
-        h = np.sqrt(weight)
-        heard = weight > 0
-        missed = np.where(heard, aligned / np.where(heard, h, 1) - amplitude * h, self._missed)
-        residual = float(np.sum(np.abs(missed[heard]) ** 2))
-        change = float(np.sum(np.abs(missed - self._missed) ** 2))
-        self._missed = missed
+        missed, heard = aligned - amplitude * weight, weight > 0
+        residual = _size(missed[heard], weight[heard])
+        change = _size((missed - self._missed)[heard], weight[heard])
+        self._missed = np.where(heard, missed, self._missed)
         n, movement = len(turned), 0.0
-        whole = float(np.sum(np.abs(turned[heard] / h[heard] - h[heard]) ** 2))
+        whole = _size((turned - weight)[heard], weight[heard])
         differ = whole > DIFFER * (n * (no + doubt) + self.phase.covariance[0] * expected)
         foreign = min(residual, change - n * no)
         is_foreign = foreign > INTERFERENCE * n * (no + doubt)
@@ -194,3 +192,8 @@ class Tracking:
     def slip(self, early: int) -> None:
         """Reduce the slope for windows that begin `early` samples earlier."""
         self.slope.value -= early * 2 * np.pi / self._grid.n_fft
+
+
+def _size(errors: NDArray[np.complex128], weight: NDArray[np.float64]) -> float:
+    """Sum of the squares of errors of Ĥ_p* Y_p, as errors of Y_p."""
+    return float(np.sum(np.abs(errors) ** 2 / weight))

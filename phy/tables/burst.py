@@ -82,7 +82,7 @@ class Channel(NamedTuple):
     tracking: NDArray[np.float64]
     """State of both tracking filters `[2, 5]`; see `phy.kernels.tracking`."""
     missed: NDArray[np.float64]
-    """By how much the last symbol's pilots were not as expected `[2, n_pilots]`."""
+    """By how much the last symbol's pilots differed, times their gains `[2, n_pilots]`."""
 
     @property
     def no(self) -> float:

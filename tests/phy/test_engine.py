@@ -177,6 +177,11 @@ def test_without_numba_numpy_computes_and_says_what_to_install(without_library, 
 def test_with_a_numba_that_fails_numpy_computes_and_says_why(
     without_library, monkeypatch, tmp_path
 ):
+    """The kernels are those of this source, even in the folder of another one."""
+    other = tmp_path / "elsewhere" / "phy"
+    other.mkdir(parents=True)
+    (other / "__init__.py").write_text("raise ImportError('another source')\n")
+    monkeypatch.chdir(other.parent)
     (tmp_path / "numba.py").write_text("raise ImportError('no numba for this processor')\n")
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{Path(phy.__file__).parents[1]}")
     used = engine.use("auto")

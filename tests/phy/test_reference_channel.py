@@ -17,6 +17,7 @@ from numba import njit
 
 from phy import GRIDS, OFDM_64_16, Modulation, kernels, reference
 from phy.reference import mapping, ofdm, smoothing, tracking, training
+from phy.reference.tracking import Kalman
 from phy.testing import (
     DELAY,
     DOUBT,
@@ -75,12 +76,16 @@ def test_a_channel_that_moves_is_followed_alike(grid):
     draws, scratch = rng(), new_scratch(grid).content
     y, sent, _ = trained(draws, grid, 0.02)
     block, channel = both_estimates(grid, y, sent)
+    phase = Kalman((0.0, 0.0), 0.0, 0.01)
+    phase.predict()
+    block.content.tracking[PHASE] = state_of(phase)
     for number in range(10):
         error = noise(draws, grid.n_used, 0.005) + (0.3 if number == 4 else 0)
         moved = in_tones(error[None], grid)[0]
         table, n = tones(grid).content, max(1, 8 - number)
         kernels.follow(moved, 0.005, n, table, block.content, scratch)
-        smoothing.follow(error, 0.005, n, channel, grid)
+        smoothing.follow(error, 0.005, n, phase, channel, grid)
+        assert block.content.tracking[PHASE] == pytest.approx(state_of(phase), rel=1e-3, abs=1e-6)
         assert_same(block.content, channel, grid)
         _move_on(table, block.content)
         smoothing.move_on(channel, grid)
@@ -225,8 +230,8 @@ def test_symbols_that_lean_are_equalised_alike(grid):
     """Unlike the reference, the kernel lets the slope lag by 0.01 rad at the outer subcarriers."""
     ours, other = equalised(grid, Modulation.QAM16, 3 * BLOCK, 0.3 / grid.n_fft, 1e-3)
     assert abs(ours[2].figures[SLOPE_USED]) > 0
-    # What the slope lags behind, the gains learn.
-    assert np.abs(ours[1] - other[1]).max() < 0.015 * np.abs(other[1]).max()
+    # What the slope lags behind, the gains learn; so they may lead by as much.
+    assert np.abs(ours[1] - other[1]).max() < 0.02 * np.abs(other[1]).max()
 
 
 @every_grid

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import resample_poly
 
-from phy import GRIDS, MCS_TABLE, OFDM_64_16, BurstOver, Receiver, Transmitter
+from phy import GRIDS, MCS_TABLE, OFDM_64_16, BurstOver, Receiver, Transmitter, points
 from phy.testing import preamble
 from tests.phy.signals import heard, noisy, payloads, silence, turned
 
@@ -29,6 +29,21 @@ def test_no_sample_is_beyond_the_peak_and_the_mean_is_1(mcs, grid):
     assert np.abs(burst).max() <= 10 ** (most / 20) * (1 + 1e-5)
     # Peaks are clipped, which costs a few hundredths of a dB.
     assert np.mean(np.abs(burst[preamble.length(grid) :]) ** 2) == pytest.approx(1, abs=0.02)
+
+
+@every_mcs
+def test_clipped_peaks_take_nothing_of_a_symbols_amplitude(mcs):
+    """Else its gain would be that of a channel that fades for one symbol."""
+    burst = a_burst(mcs.index, 60)[preamble.length() :]
+    # The first two symbols are the header; the last one ends softly.
+    n_fft = OFDM_64_16.n_fft
+    inner = burst.reshape(-1, OFDM_64_16.n_symbol)[2:-1, -n_fft:]
+    y = np.fft.fft(inner)[:, OFDM_64_16.bins][:, OFDM_64_16.data_at] * np.sqrt(52) / n_fft
+    known = points(mcs.modulation)
+    sent = known[np.argmin(np.abs(y[:, :, None] - known), axis=2)]
+    gain = np.sum(y * sent.conj(), axis=1).real / np.sum(np.abs(sent) ** 2, axis=1)
+    assert np.std(gain) < 0.004
+    assert np.abs(gain - 1).max() < 0.025
 
 
 def test_bursts_begin_and_end_without_a_step():
