@@ -10,11 +10,13 @@ from phy.acquisition import Acquired
 from phy.estimation import tones
 from phy.layout import BurstLayout
 from phy.numerology import Numerology
-from phy.tables.burst import SLOPE
+from phy.tables.burst import N_FOLLOWED, SLOPE, TURNS
 
 SLIP_EVERY = 256
 """Interval in payload symbols at which the FFT windows are aligned to the sender's clock."""
 
+SEEMING = 5e-6
+"""Squared turn in rad² that phase noise and clocks make still echoes seem to have in a symbol."""
 # When a PDU fails and the power above the noise is below this share of the burst's, the burst has
 # ended.
 _FADED = 0.25
@@ -56,6 +58,13 @@ class IncomingBurst:
         """Whether the burst has ended, by the `powers` of the symbols of a PDU that failed."""
         channel = self.acquired.channel.content
         return len(powers) > 0 and bool(powers.mean() < channel.no + _FADED * channel.gain)
+
+    @property
+    def doppler(self) -> float:
+        """Doppler of the echoes so far, in cycles per sample."""
+        figures = self.acquired.channel.content.figures
+        turns = float(figures[TURNS]) / max(1.0, float(figures[N_FOLLOWED])) - SEEMING
+        return math.sqrt(max(0.0, turns)) / (2 * math.pi * self._n_symbol)
 
     def go_on(self) -> None:
         """Prepare for the next symbols; slip the windows if that is due."""

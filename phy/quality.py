@@ -29,12 +29,16 @@ class BurstQuality(NamedTuple):
 
 
 class PduHeard(NamedTuple):
-    """PDU `number` of a burst, with a correct CRC-32; `at` is the index after its last sample."""
+    """PDU `number` of a burst, with a correct CRC-32; `at` is the index after its last sample.
+
+    With the last PDU comes the `doppler` of the echoes during the burst, in cycles per sample.
+    """
 
     data: bytes
     number: int
     at: int
     burst: BurstQuality
+    doppler: float | None = None
 
 
 class BurstOver(NamedTuple):

@@ -265,8 +265,10 @@ class Receiver:
             if data is not None:
                 burst.n_good += 1
                 self.counters["pdus_good"] += 1
-                at = burst.end_of(through) + BACKOFF
-                events.append(PduHeard(data, number, at, found.quality))
+                at, is_last = burst.end_of(through) + BACKOFF, number + 1 == plan.n_pdus
+                events.append(
+                    PduHeard(data, number, at, found.quality, burst.doppler if is_last else None)
+                )
             else:
                 burst.n_bad += 1
                 self.counters["pdus_bad"] += 1

@@ -133,8 +133,8 @@ class Node:
         now, now_ns = at_once(self._pdu_link.now, time.time_ns)
         link = self._link
         self._air.heard(pdus)
-        for data, at, snr_db, ended_at in pdus:
-            messages = link.hear(data, at, snr_db, now, ended_at)
+        for data, at, snr_db, ended_at, doppler_hz in pdus:
+            messages = link.hear(data, at, snr_db, now, ended_at, doppler_hz)
             # First, as the PDU may bring both a new meaning of a number and messages of it.
             self.bus.forget_topics(link.take_changed_topics())
             for message in messages:

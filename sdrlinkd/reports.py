@@ -197,6 +197,10 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     """Share of our PDUs that it lost by its own report, 0 to 1; null: not reported."""
     mcs: int = 0
     """MCS with which we send default and bulk traffic to it."""
+    doppler_hz: float | None = None
+    """Recent Doppler of its bursts, in Hz; null: not known."""
+    longest_burst_s: float | None = None
+    """Longest burst that its Doppler allows, in s; null: it sets no bound."""
     clock: ClockReport | None = None
     """What is known about its clock; null: nothing."""
 

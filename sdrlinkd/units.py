@@ -26,6 +26,7 @@ _FREQUENCIES = {"": 1.0} | {
 _BIT_RATES = {"": 1.0} | {
     prefix + unit: value for prefix, value in _THOUSANDS.items() for unit in ("bit/s", "bps")
 }
+_SPEEDS = {"": 1.0, "m/s": 1.0, "km/h": 1 / 3.6, "kmh": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600}
 _NUMBER = re.compile(
     r"\s*(inf|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*([a-zµ/]*)\s*", re.IGNORECASE
 )
@@ -56,6 +57,11 @@ def hertz(text: str, key: str) -> float:
 def bits_per_second(text: str, key: str) -> float:
     """A rate in bit/s from `1e5` or `100 kbit/s`. Raises UserError that cites `key`."""
     return _finite(text, key, _BIT_RATES, "a bit rate such as 1e5 or 100kbit/s")
+
+
+def metres_per_second(text: str, key: str) -> float:
+    """A speed in m/s from `5`, `5 m/s` or `18km/h`. Raises UserError that cites `key`."""
+    return _finite(text, key, _SPEEDS, "a speed such as 5, 5m/s or 18km/h")
 
 
 def _finite(text: str, key: str, units: dict[str, float], allowed: str) -> float:

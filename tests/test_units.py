@@ -3,7 +3,7 @@
 import pytest
 
 from sdrlinkd.errors import UserError
-from sdrlinkd.units import bits_per_second, hertz, octets, seconds
+from sdrlinkd.units import bits_per_second, hertz, metres_per_second, octets, seconds
 
 
 @pytest.mark.parametrize(
@@ -40,11 +40,18 @@ def test_bit_rates(text, value):
     assert bits_per_second(text, "key") == pytest.approx(value)
 
 
+@pytest.mark.parametrize(
+    ("text", "value"), [("5", 5), ("5 m/s", 5), ("18km/h", 5), ("10kn", 5.144)]
+)
+def test_speeds(text, value):
+    assert metres_per_second(text, "key") == pytest.approx(value, rel=1e-3)
+
+
 @pytest.mark.parametrize("text", ["", "fast", "1parsec", "-1", "1 2", "1e", "nan"])
 def test_what_is_neither_is_refused(text):
-    for read in (seconds, octets, hertz, bits_per_second):
+    for read in (seconds, octets, hertz, bits_per_second, metres_per_second):
         with pytest.raises(UserError, match="--key: got"):
             read(text, "--key")
-    for read in (octets, hertz, bits_per_second):
+    for read in (octets, hertz, bits_per_second, metres_per_second):
         with pytest.raises(UserError):
             read("inf", "--key")

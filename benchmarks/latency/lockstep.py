@@ -44,7 +44,7 @@ class _Stamped(Station):
     def heard(self, pdus: Sequence[Heard]) -> None:
         """Take PDUs from the air, and record the latency of their messages."""
         now = self.modem.now()
-        for data, at, snr_db, ended_at in pdus:
+        for data, at, snr_db, ended_at, _ in pdus:
             for message in self.link.hear(data, at, snr_db, now, ended_at):
                 (sent_at,) = _AT.unpack_from(message.payload, len(CDR))
                 age_s = self.link.delivered(message, now)

@@ -84,7 +84,7 @@ class Station:
 
     def heard(self, pdus: Sequence[Heard]) -> None:
         """Take PDUs from the air, and record what they contained."""
-        for data, at, snr_db, _ in pdus:
+        for data, at, snr_db, *_ in pdus:
             for message in self.link.hear(data, at, snr_db):
                 age_s = self.link.delivered(message, self.modem.now())
                 if age_s is not None:

@@ -26,10 +26,12 @@ from phy.tables.burst import (
     DRIFT,
     DUE,
     MOVES,
+    N_FOLLOWED,
     NO,
     PHASE,
     SCALED,
     SPREAD,
+    TURNS,
     Channel,
     Planes,
     Scratch,
@@ -175,6 +177,7 @@ def start(tones: Tones, channel: Channel) -> None:
     stand_still(channel)
     figures, unknown = channel.figures, channel.unknown
     figures[SPREAD], figures[SCALED], figures[MOVES] = 0, 1, 1
+    figures[TURNS] = figures[N_FOLLOWED] = 0
     for group in range(channel.power.size):
         speed = _SPEED * channel.power[group]
         unknown[0, group] += _OLD * _OLD * speed
@@ -332,12 +335,23 @@ def follow(
         _grow(whole, channel)
         turning = _turning(channel)
         _turn(whole, turning, channel)
+        figures[TURNS] += n * _turns(whole, turning, tones, channel)
         if _is_still(variance * n, turning, tones, channel):
             # The phase's filter must go on alone, so it no longer turns against the gains.
             channel.tracking[PHASE, 1] += turning
             stand_still(channel)
+    figures[N_FOLLOWED] += n
     _sum_doubt(tones, channel)
     figures[DUE] = _next(variance * n, tones, channel)
+
+
+@step
+def _turns(whole: float, turning: float, tones: Tones, channel: Channel) -> float:
+    """The squared turn of echoes in a symbol that speeds surely tell, in rad²; see `_turn`."""
+    speed = _own_speed(turning, channel)
+    for group in range(channel.power.size):
+        speed -= _size(group, tones) * channel.unknown[2, group]
+    return 2 * max(0.0, speed) / whole if whole > 0 else 0.0
 
 
 @step

@@ -49,6 +49,10 @@ class Channel:
     """The variance of the common amplitude, as a share of it; 0 until a step of it."""
     scaled: float = 1.0
     """The steps of the amplitude since the channel was estimated, as one."""
+    turns: float = 0.0
+    """The sum over symbols of the squared turn of echoes in a symbol, in rad²."""
+    n_followed: int = 0
+    """The number of these symbols."""
     due: int = LONGEST
     """The number of symbols from one correction to the next."""
 

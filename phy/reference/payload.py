@@ -15,6 +15,8 @@ from phy.sequences import whitening
 
 SLIP_EVERY = 256
 """Interval in symbols at which the FFT windows are aligned to the sender's clock."""
+SEEMING = 5e-6
+"""Squared turn in rad² that phase noise and clocks make still echoes seem to have in a symbol."""
 FADED = 0.25
 """A burst is gone if a PDU fails with less than this share of the burst's power above noise."""
 
@@ -84,6 +86,13 @@ class Payload:
         self.n_good += data is not None
         self.n_bad += data is None
         return data
+
+    @property
+    def doppler(self) -> float:
+        """Doppler of the echoes so far, in cycles per sample: their mean turn, beyond SEEMING."""
+        channel = self.acquired.equaliser.channel
+        turns = channel.turns / max(1, channel.n_followed) - SEEMING
+        return math.sqrt(max(0.0, turns)) / (2 * math.pi * self._grid.n_symbol)
 
     def is_gone(self) -> bool:
         """Whether the symbols since the last PDU lacked the power of a burst."""

@@ -241,7 +241,8 @@ class Receiver:
             if data is not None:
                 self.counters["pdus_good"] += 1
                 at = burst.end_of(last) + BACKOFF
-                events.append(PduHeard(data, burst.n_done - 1, at, burst.acquired.quality))
+                doppler = burst.doppler if burst.n_done == burst.plan.n_pdus else None
+                events.append(PduHeard(data, burst.n_done - 1, at, burst.acquired.quality, doppler))
             else:
                 self.counters["pdus_bad"] += 1
                 if burst.n_done < burst.plan.n_pdus and burst.is_gone():

@@ -111,6 +111,7 @@ def start(channel: Channel, grid: Numerology) -> None:
     speed = SPEED * channel.power
     channel.unknown = np.array([channel.unknown[0] + OLD**2 * speed, OLD * speed, speed])
     channel.moves, channel.speed = True, np.zeros(grid.n_used, np.complex128)
+    channel.turns, channel.n_followed = 0.0, 0
     sum_doubt(channel, grid)
     channel.due = _next(channel.no, channel, grid)
 
@@ -205,14 +206,22 @@ def follow(
         _grow(whole, channel)
         turning = _turning(channel)
         _turn(whole, turning, channel)
+        channel.turns += n * _turns(whole, turning, channel, grid)
         if _is_still(variance * n, turning, channel, grid):
             # The phase's filter must go on alone, so it no longer turns against the gains.
             phase.rate += turning
             channel.moves, channel.drift = False, 0.0
             channel.speed = np.zeros(grid.n_used, np.complex128)
             channel.unknown[1:] = 0
+    channel.n_followed += n
     sum_doubt(channel, grid)
     channel.due = _next(variance * n, channel, grid)
+
+
+def _turns(whole: float, turning: float, channel: Channel, grid: Numerology) -> float:
+    """The squared turn of echoes in a symbol that speeds surely tell, in rad²; see `_turn`."""
+    surely = _own_speed(turning, channel) - float(np.sum(sizes(grid) * channel.unknown[2]))
+    return 2 * max(0.0, surely) / whole if whole > 0 else 0.0
 
 
 def _grow(whole: float, channel: Channel) -> None:

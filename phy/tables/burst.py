@@ -98,15 +98,17 @@ class Channel(NamedTuple):
 PHASE, SLOPE = 0, 1
 """Rows of `tracking`: the phase common to all tones, and its slope over them."""
 
-N_FIGURES = 13
-NO, GAIN, DELAY, DRIFT, N_HEARD, CERTAIN, WRONG, SLOPE_USED, DOUBT, DUE, MOVES, SPREAD, SCALED = (
-    range(N_FIGURES)
-)
+N_FIGURES = 15
+(
+    NO, GAIN, DELAY, DRIFT, N_HEARD, CERTAIN, WRONG, SLOPE_USED, DOUBT, DUE, MOVES, SPREAD, SCALED,
+    TURNS, N_FOLLOWED,
+) = range(N_FIGURES)  # fmt: skip
 """Of `figures`: noise on a subcarrier, mean |h|², phase a subcarrier, drift; symbols since a
 correction, what was certain in them, Σ |E s|², and what was not, Σ |h|² (E|s|² − |E s|²); the slope
 that subcarriers are turned back by; mean variance of the gains; symbols from one correction to the
 next; whether gains have a speed; variance of the common amplitude (0 until a step of it); its steps
-since the estimate, as one."""
+since the estimate, as one; sum over symbols of the squared turn of echoes in a symbol, in rad², and
+the number of these symbols."""
 
 
 @block_of(

@@ -27,7 +27,7 @@ from sdrlinkd.plan import (
     with_declared,
 )
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
-from sdrlinkd.units import seconds
+from sdrlinkd.units import metres_per_second, seconds
 
 COLUMNS = (
     words("topic"), words("class", 4, 7), figure("Hz"), figure("bytes", 2), figure("PDUs", 1),
@@ -62,6 +62,12 @@ def plan(
         str | None,
         typer.Option(help="The radio's receive-to-transmit turnaround; default: as configured."),
     ] = None,
+    speed: Annotated[
+        str | None,
+        typer.Option(
+            help="How fast robots move past each other, such as 5m/s or 18km/h: it bounds bursts."
+        ),
+    ] = None,
     host: Annotated[
         str, typer.Option(help="Latency of the hosts; `sdrlinkctl doctor` measures it.")
     ] = f"{1e3 * HOST_S:g}ms",
@@ -85,7 +91,10 @@ def plan(
     host_s, has_numbers = seconds(host, "--host"), setup.has_numbers
     counts = None if robots is None else _counts(robots)
     n = counts[0] if counts is not None and len(counts) == 1 else None
-    setting = setting_of(setup.config, setup.node_id, n, turnaround_s, host_s, has_numbers)
+    speed_m_s = 0.0 if speed is None else metres_per_second(speed, "--speed")
+    setting = setting_of(
+        setup.config, setup.node_id, n, turnaround_s, host_s, has_numbers, speed_m_s
+    )
     bounds = list(setting.bounds)
     refused: list[str] = []
     if counts is not None and n is None:

@@ -75,7 +75,14 @@ from sdrlinkd.link.timesync import (
 )
 from sdrlinkd.link.topics import HeardTopic, Offer
 from sdrlinkd.link.traits import Opportunity, PduLinkTraits, Sensed
-from sdrlinkd.link.transmit import Burst, Fit, Outcome, RateControl, RateParams
+from sdrlinkd.link.transmit import (
+    Burst,
+    Fit,
+    Outcome,
+    RateControl,
+    RateParams,
+    longest_burst_s,
+)
 
 __all__ = [
     "AS_CONFIGURED",
@@ -148,6 +155,7 @@ __all__ = [
     "check_access",
     "flush_told",
     "lifespan_of",
+    "longest_burst_s",
     "may_share",
     "parity_pdus",
     "percent",

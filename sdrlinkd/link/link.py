@@ -37,6 +37,7 @@ from sdrlinkd.link.receive import (
     Reception,
     RecordHeard,
     Retain,
+    Signal,
     can_be_true,
 )
 from sdrlinkd.link.repeat import Answers, Asking, RepeatParams
@@ -300,14 +301,17 @@ class Link:
         snr_db: float | None = None,
         now: float | None = None,
         ended_at: float | None = None,
+        doppler_hz: float | None = None,
     ) -> list[Delivered]:
         """Take a PDU from the air, and return the messages that it completes.
 
         The preamble of its burst arrived at `at`, and the PDU's last sample at `ended_at`; `now`
-        and `ended_at` default to `at`.
+        and `ended_at` default to `at`. `snr_db` and `doppler_hz` are those of the burst, if known.
         """
         now, ended_at = at if now is None else now, at if ended_at is None else ended_at
-        delivered = self._dispatch(self._reception.hear(data, at, snr_db, now, ended_at))
+        delivered = self._dispatch(
+            self._reception.hear(data, at, Signal(snr_db, doppler_hz), now, ended_at)
+        )
         self._tell_routes(now)
         return delivered
 
@@ -546,6 +550,7 @@ class Link:
         name = self._topics[topic_id].name
         lines = self._why.explain(topic_id, name, told, now, self._air_use())
         report = self._reporter.reserved()
+        lines += self._scheduler.moves_words(now)
         return [*lines, *reserved_words(self.own_id, octet(topic_id), report)]
 
     def report(self, now: float, names: Names = NO_NAMES) -> LinkReport:

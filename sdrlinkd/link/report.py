@@ -269,7 +269,7 @@ class Reporter:
         for report in self._neighbors.report(now, self._digest):
             src = report.src
             heard, lost = per_s["pdus", src], max(0.0, per_s["lost", src])
-            there = scheduler.heard_by(src)
+            there, moves = scheduler.heard_by(src), scheduler.moves(src, now)
             reports.append(
                 msgspec.structs.replace(
                     report,
@@ -278,6 +278,8 @@ class Reporter:
                     snr_there_db=there.snr_db,
                     per_there=there.per,
                     mcs=there.mcs,
+                    doppler_hz=moves.doppler_hz,
+                    longest_burst_s=moves.longest_burst_s,
                 )
             )
         return reports

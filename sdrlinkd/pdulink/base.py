@@ -10,13 +10,15 @@ from sdrlinkd.reports import PduLinkReport
 class Heard(NamedTuple):
     """A PDU from the air: its bytes, the time of its burst's preamble, and its SNR.
 
-    `ended_at` is when its last sample arrived; None: at the same time.
+    `ended_at` is when its last sample arrived; None: at the same time. `doppler_hz` is that of the
+    burst's echoes; None: not known, or not yet.
     """
 
     data: bytes
     at: float
     snr_db: float | None = None
     ended_at: float | None = None
+    doppler_hz: float | None = None
 
 
 class BurstSeen(NamedTuple):

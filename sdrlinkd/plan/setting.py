@@ -7,7 +7,7 @@ import msgspec
 
 from sdrlinkd.config import Config
 from sdrlinkd.errors import ConfigError, UserError
-from sdrlinkd.link import PduLinkTraits, Settled, percent, settle
+from sdrlinkd.link import PduLinkTraits, Settled, longest_burst_s, percent, settle
 from sdrlinkd.modem import PresumedRadio, presume_radio
 from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.bounds import AccessBound, access_bounds
@@ -17,6 +17,7 @@ HOST_S = 0.01
 a machine with two cores that also runs other programs."""
 
 
+LIGHT_M_S = 299_792_458.0
 LAST_ID = 254
 MOST_ROBOTS = 32
 """Most robots of a plan."""
@@ -29,11 +30,12 @@ def setting_of(
     turnaround_s: float | None = None,
     host_s: float = HOST_S,
     has_numbers: bool = False,
+    speed_m_s: float = 0.0,
 ) -> Setting:
     """The setting for `robots` robots (default: as access.nodes lists), which all send the same.
 
-    `has_numbers` as in Setting. `turnaround_s` replaces the radio's configured turnaround. Raises
-    UserError, ConfigError.
+    `has_numbers` as in Setting. `turnaround_s` replaces the radio's configured turnaround. With
+    `speed_m_s`, robots move past each other so fast. Raises UserError, ConfigError.
     """
     radio = presume_radio(config, turnaround_s)
     access = config.access
@@ -62,6 +64,10 @@ def setting_of(
     modem = config.modem
     longest_s = radio.traits.longest_burst_s[modem.mcs]
     one_s = radio.airtimes.airtime_s(modem.mcs, 1)
+    if speed_m_s:
+        doppler_hz = speed_m_s * modem.centre_hz / LIGHT_M_S
+        longest_s = max(one_s, min(longest_s, longest_burst_s(doppler_hz)))
+        notes.append(_moving(speed_m_s, modem.centre_hz, doppler_hz, longest_s))
     bounds = access_bounds(settled, radio.traits, n, radio.longest_s, one_s)
     return Setting(
         radio.airtimes, config.inner_pdu_size, modem.mcs, longest_s, config.classes, n, settled,
@@ -109,6 +115,13 @@ def _notes(
             "csma: collided bursts are lost, and one message in a hundred waits longer than this"
         )
     return notes
+
+
+def _moving(speed_m_s: float, centre_hz: float, doppler_hz: float, longest_s: float) -> str:
+    return (
+        f"at {speed_m_s:.3g} m/s and {1e-9 * centre_hz:.3g} GHz, channels change at "
+        f"{doppler_hz:.2g} Hz: bursts are at most {1e3 * longest_s:.2g} ms long"
+    )
 
 
 def _times(traits: PduLinkTraits, host_s: float) -> str:

@@ -7,7 +7,7 @@ import pytest
 from sdrlinkd.errors import PduError
 from sdrlinkd.link import LinkParams, TopicPolicy
 from sdrlinkd.link.queue import Inflated
-from sdrlinkd.link.receive import Neighbors, RecordHeard
+from sdrlinkd.link.receive import Neighbors, RecordHeard, Signal
 from sdrlinkd.link.receive.testing import (
     Acceptance,
     Door,
@@ -75,7 +75,7 @@ class Entrance:
         )  # fmt: skip
 
     def admit(self, at=1.0, data=SEALED):
-        return self.door.admit(data, at, 12.0, at, at + 0.5)
+        return self.door.admit(data, at, Signal(12.0), at, at + 0.5)
 
     @property
     def refused(self):
@@ -87,7 +87,7 @@ class Entrance:
 def test_what_comes_in_the_clear_is_admitted_or_refused():
     entrance = Entrance()
     (admitted,) = entrance.admit(data=CLEAR)
-    assert admitted[:5] == (CLEAR, CLEAR, 1.0, 12.0, 1.5)
+    assert admitted[:5] == (CLEAR, CLEAR, 1.0, Signal(12.0), 1.5)
     assert (admitted.is_proven, admitted.ticks, admitted.is_held) == (True, None, False)
     assert (admitted.number, admitted.first_at) == (None, 1.0)
     entrance.opener.refuses = True
@@ -263,7 +263,7 @@ def test_what_waits_for_a_proof_shows_that_its_source_is_there():
         ({"hop": 1}, []),
     ):  # fmt: skip
         first, *rest = reader().glance(admitted_pdu(RECEIPT, beacon, frame, **how))
-        assert (first.stamps, first.at, first.snr_db) == ([], 5.0, 12.0)
+        assert (first.stamps, first.at, first.signal.snr_db) == ([], 5.0, 12.0)
         assert first.is_relayed == (not used)
         assert rest == [RecordHeard(9, each, 5.0) for each in used]
     assert reader().glance(admitted_pdu()._replace(data=b"short")) == []

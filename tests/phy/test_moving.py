@@ -42,6 +42,21 @@ def test_pdus_are_heard_while_the_channel_moves(rate_hz, doppler_hz, n_pdus, siz
     assert lost.share <= most, lost
 
 
+@pytest.mark.parametrize(
+    ("rate_hz", "doppler_hz", "least", "most"),
+    [(1e6, 0.0, 0, 5), (1e6, 40.0, 25, 55), (5e6, 0.0, 0, 25), (5e6, 200.0, 120, 260)],
+)
+def test_the_last_pdu_of_a_burst_tells_the_doppler(rate_hz, doppler_hz, least, most):
+    air, squares = Air(rate_hz=rate_hz, profile="tdl-a", doppler_hz=doppler_hz), []
+    receiver = Receiver(max_frequency=0.1)
+    for _, (_, x) in zip(range(60), bursts(air, 1, 220, 25.0, SEED, 4), strict=False):
+        heard_pdus = [each for each in receiver.push(x) if isinstance(each, PduHeard)]
+        assert all((each.doppler is not None) == (each.number == 3) for each in heard_pdus)
+        squares += [(each.doppler * rate_hz) ** 2 for each in heard_pdus if each.number == 3]
+    assert len(squares) > 50
+    assert least <= np.sqrt(np.mean(squares)) <= most
+
+
 def test_the_reference_hears_them_too():
     air = Air(rate_hz=1e6, profile="tdl-a", doppler_hz=100.0)
     receiver, got, sent = reference.Receiver(max_frequency=0.1), [], []

@@ -21,10 +21,12 @@ from phy.reference.tracking import Kalman
 from phy.testing import (
     DELAY,
     DOUBT,
+    N_FOLLOWED,
     PHASE,
     SLOPE,
     SLOPE_USED,
     SPREAD,
+    TURNS,
     axes,
     compute,
     new_scratch,
@@ -95,6 +97,8 @@ def test_a_channel_that_moves_is_followed_alike(grid):
             smoothing.doubt_more(0.1, channel, grid)
             assert_same(block.content, channel, grid)
     assert channel.drift > 0
+    turns = block.content.figures[[TURNS, N_FOLLOWED]]
+    assert turns == pytest.approx([channel.turns, channel.n_followed], rel=1e-3, abs=1e-6)
     assert 0 < channel.doubt < 0.1
 
 

@@ -54,6 +54,19 @@ def test_without_a_list_csma_is_planned_for_two():
     assert "planned for two robots" in setting.notes[0]
 
 
+@pytest.mark.parametrize(("speed_m_s", "bound_ms"), [(5.0, 4.9), (0.5, None), (500.0, None)])
+def test_on_the_move_bursts_are_as_short_as_the_link_makes_them(speed_m_s, bound_ms):
+    """Neither longer than the modem allows, nor shorter than one PDU."""
+    config = parse_config('backend = "loopback"\n[modem]\nrate_hz = "5 Msps"\nmax_burst_s = 0.01\n')
+    at_rest, moving = setting_of(config, 1), setting_of(config, 1, speed_m_s=speed_m_s)
+    assert len(moving.notes) == len(at_rest.notes) + 1
+    if bound_ms is None:
+        limits = pytest.approx(at_rest.longest_s), pytest.approx(at_rest.one_s)
+        assert moving.longest_s == limits[speed_m_s > 100]
+    else:
+        assert moving.longest_s == pytest.approx(1e-3 * bound_ms, rel=0.01)
+
+
 def test_options_go_before_the_configuration():
     config = preset("hackrf", TWO_WAY)
     assert odom(config, robots=3).robots == 3

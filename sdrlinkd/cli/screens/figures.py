@@ -45,6 +45,11 @@ def decibels(value: float | None) -> str:
     return NOTHING if value is None else f"{value:.1f}"
 
 
+def hertz(value: float | None) -> str:
+    """A frequency in Hz."""
+    return NOTHING if value is None else f"{value:.0f}"
+
+
 def percent(share: float | None, digits: int = 1) -> str:
     """A share from 0 to 1, in %."""
     return NOTHING if share is None else f"{100 * share:.{digits}f}"

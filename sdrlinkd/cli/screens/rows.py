@@ -8,6 +8,7 @@ from sdrlinkd.cli.screens.figures import (
     bytes_rate,
     decibels,
     duration,
+    hertz,
     milliseconds,
     percent,
     rate,
@@ -26,8 +27,9 @@ def robots_table(reports: Sequence[NeighborReport], *, rule: bool) -> FittedTabl
         "robots heard" if rule else "",
         (
             words("robot"), figure("heard"), figure("SNR dB"), figure("there"), figure("PER %"),
-            figure("there"), figure("MCS", 2), figure("PDUs", 4), figure("lost", 3),
-            figure("repaired", 7), figure("ever %", 5), figure("twice", 6), words("registry", 1, 8),
+            figure("there"), figure("MCS", 2), figure("Doppler Hz", 6), figure("PDUs", 4),
+            figure("lost", 3), figure("repaired", 7), figure("ever %", 5), figure("twice", 6),
+            words("registry", 1, 8),
         ),
         rule=rule,
     )  # fmt: skip
@@ -40,6 +42,7 @@ def robots_table(reports: Sequence[NeighborReport], *, rule: bool) -> FittedTabl
             percent(each.per_lately),
             percent(each.per_there),
             str(each.mcs),
+            hertz(each.doppler_hz),
             str(each.pdus_heard),
             str(each.pdus_lost),
             str(each.pdus_repaired),

@@ -22,6 +22,7 @@ from sdrlinkd.link.receive.events import (
     PduHeard,
     PduPlaced,
     RecordHeard,
+    Signal,
 )
 from sdrlinkd.link.receive.latency import Latency, Parts
 from sdrlinkd.link.receive.neighbors import LONGEST_GAP_S, PRESENT_S, Neighbor, Neighbors
@@ -55,5 +56,6 @@ __all__ = [
     "RecordHeard",
     "Retain",
     "SequenceTrack",
+    "Signal",
     "can_be_true",
 ]

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.receive.acceptance import Acceptance
+from sdrlinkd.link.receive.events import Signal
 from sdrlinkd.link.receive.neighbors import Neighbors
 from sdrlinkd.link.receive.repeated import RepeatedPdus
 from sdrlinkd.link.receive.rx_ledger import RxLedger
@@ -32,7 +33,7 @@ class Admitted(NamedTuple):
     data: bytes
     raw: bytes
     at: float
-    snr_db: float | None
+    signal: Signal
     ended_at: float
     is_proven: bool = True
     is_glance: bool = False
@@ -74,13 +75,13 @@ class Door:
         self._schedules_until: dict[int, float] = {}
 
     def admit(
-        self, data: bytes, at: float, snr_db: float | None, now: float, ended_at: float
+        self, data: bytes, at: float, signal: Signal, now: float, ended_at: float
     ) -> list[Admitted]:
         """The PDUs that may be taken now that `data` has come."""
         number, first_at = self._first(data, at)
         is_repeated = number is not None
         pdu = Admitted(
-            data, data, at, snr_db, ended_at, is_held=is_repeated, number=number, first_at=first_at
+            data, data, at, signal, ended_at, is_held=is_repeated, number=number, first_at=first_at
         )
         if not is_sealed(data):
             if self._opener.refuses_clear(data, now):

@@ -11,18 +11,24 @@ if TYPE_CHECKING:
     from sdrlinkd.link.receive.pdu_read import PduRead
 
 
+class Signal(NamedTuple):
+    """The signal of a burst: SNR in dB, and Doppler of its echoes in Hz; None: not known."""
+
+    snr_db: float | None = None
+    doppler_hz: float | None = None
+
+
 class PduHeard(NamedTuple):
     """A valid PDU from another robot, for any destination; its burst's preamble came at `at`.
 
-    `is_relayed`: a robot other than its source has sent it. `snr_db` is that of its signal, None if
-    unknown.
+    `is_relayed`: a robot other than its source has sent it.
     """
 
     pdu: Pdu
     stamps: list[Stamp]
     at: float
     is_relayed: bool
-    snr_db: float | None
+    signal: Signal
 
 
 class RecordHeard(NamedTuple):

@@ -111,7 +111,7 @@ class Inbox:
             self._routes.forwarded(admitted.raw, at)
         stamps = read.stamps
         if not admitted.was_seen and (pdu.src != self._own_id or is_relayed):
-            events.append(PduHeard(pdu, stamps, at, is_relayed, admitted.snr_db))
+            events.append(PduHeard(pdu, stamps, at, is_relayed, admitted.signal))
         if pdu.src == self._own_id and not self._hears_self:
             self._own_pdus.heard(admitted.raw, at)
             return self._drop("rx_own", events)
@@ -142,7 +142,7 @@ class Inbox:
         if control.n_bad:
             self._ledger.skip_records(control.n_bad)
         if not is_relayed:
-            neighbor.note_snr(admitted.snr_db, at)
+            neighbor.note_snr(admitted.signal.snr_db, at)
         for stamp in stamps:
             self._ages.stamp(pdu.src, stamp, at)
         is_ours = pdu.dst in (BROADCAST, self._own_id) or self._hears_self

@@ -114,7 +114,7 @@ class PduReader:
             pdu, _, records, is_relayed, _ = self.read(admitted)
         except PduError:
             return []
-        events: list[Event] = [PduHeard(pdu, [], admitted.at, is_relayed, admitted.snr_db)]
+        events: list[Event] = [PduHeard(pdu, [], admitted.at, is_relayed, admitted.signal)]
         if not is_relayed:
             events += [
                 RecordHeard(pdu.src, record, admitted.at)

@@ -9,7 +9,7 @@ from sdrlinkd.link.receive.air_heard import AirHeard
 from sdrlinkd.link.receive.completion import Completion
 from sdrlinkd.link.receive.delivered import Delivered, Retain
 from sdrlinkd.link.receive.door import Door
-from sdrlinkd.link.receive.events import Event
+from sdrlinkd.link.receive.events import Event, Signal
 from sdrlinkd.link.receive.handover import AgeReport, Handover
 from sdrlinkd.link.receive.inbox import Inbox
 from sdrlinkd.link.receive.neighbors import Neighbors
@@ -69,7 +69,7 @@ class Reception:
         self._air = AirHeard()
 
     def hear(
-        self, data: bytes, at: float, snr_db: float | None, now: float, ended_at: float
+        self, data: bytes, at: float, signal: Signal, now: float, ended_at: float
     ) -> list[Event]:
         """Take a PDU and return the events that follow from it.
 
@@ -78,7 +78,7 @@ class Reception:
         if data[1:2] != self._own_src:
             self._air.add(at, ended_at)
         events: list[Event] = []
-        for admitted in self._door.admit(data, at, snr_db, now, ended_at):
+        for admitted in self._door.admit(data, at, signal, now, ended_at):
             events += self._inbox.hear(admitted, now)
         return events
 

@@ -8,6 +8,7 @@ from sdrlinkd.link.transmit.beacons import Beacons
 from sdrlinkd.link.transmit.burst import Burst, Outcome
 from sdrlinkd.link.transmit.control_records import MOST_RECEIPTS, ControlRecords
 from sdrlinkd.link.transmit.fit import Fit, fit_to
+from sdrlinkd.link.transmit.motion import longest_burst_s
 from sdrlinkd.link.transmit.no_radio import NoRadio
 from sdrlinkd.link.transmit.own_flows import OwnFlows
 from sdrlinkd.link.transmit.rate import (
@@ -49,4 +50,5 @@ __all__ = [
     "TransmitReport",
     "TxDelayMeters",
     "fit_to",
+    "longest_burst_s",
 ]

@@ -6,6 +6,7 @@ from sdrlinkd.link.paths import Edges
 from sdrlinkd.link.receive import PduHeard
 from sdrlinkd.link.traits import Opportunity
 from sdrlinkd.link.transmit.burst import Burst, Outcome
+from sdrlinkd.link.transmit.motion import Moves
 from sdrlinkd.link.transmit.rate import HeardThere
 from sdrlinkd.link.transmit.report import TransmitReport
 from sdrlinkd.wire import Pdu, Record
@@ -55,6 +56,14 @@ class NoRadio:
     def heard_by(self, src: int) -> HeardThere:  # noqa: ARG002  # the same for all
         """How robot `src` hears us: unknown, as we do not send."""
         return HeardThere(None, None, 0)
+
+    def moves(self, src: int, now: float) -> Moves:  # noqa: ARG002  # the same for all
+        """How fast the channel to robot `src` changes: unknown, as there is no radio."""
+        return Moves()
+
+    def moves_words(self, now: float) -> list[str]:  # noqa: ARG002  # the same always
+        """Nothing to say, as there is no radio."""
+        return []
 
     def report(self) -> TransmitReport:
         """The report: nothing was sent."""

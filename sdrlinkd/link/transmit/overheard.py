@@ -7,6 +7,7 @@ from sdrlinkd.link.qos import CLASSES, Qos
 from sdrlinkd.link.receive import PduHeard
 from sdrlinkd.link.schedule import Flow, Forecasts
 from sdrlinkd.link.transmit.fit import Fit
+from sdrlinkd.link.transmit.motion import Motion
 from sdrlinkd.link.transmit.rate import SNR_STEP_DB
 from sdrlinkd.wire import CONTROL_TOPIC_ID, Beacon, Frame, Grant, LinkReport, Pdu, Record, Want
 
@@ -15,12 +16,14 @@ Knows = Callable[[int, float], bool]
 
 
 class Overheard:
-    """Passes what was heard to the access policy, to rate control, and to the forecasts."""
+    """Passes what was heard to the access policy, to rate and burst control, and the forecasts."""
 
     def __init__(
-        self, fit: Fit, forecasts: Forecasts, own_id: int, has_control: bool, knows: Knows
-    ) -> None:
+        self, fit: Fit, forecasts: Forecasts, motion: Motion, own_id: int, has_control: bool,
+        knows: Knows,
+    ) -> None:  # fmt: skip
         self._knows = knows
+        self._motion = motion
         self._access, self._rate = fit.settled.access, fit.rate
         self._forecasts = forecasts
         self._own_id = own_id
@@ -30,12 +33,14 @@ class Overheard:
 
     def pdu(self, event: PduHeard) -> None:
         """Note a valid PDU that another robot has sent."""
-        pdu, stamps, at, is_relayed, snr_db = event
+        pdu, stamps, at, is_relayed, (snr_db, doppler_hz) = event
         src = pdu.src
         self._is_weak = snr_db is not None and self._too_weak(snr_db)
         self._access.heard(src, at, is_relayed, is_weak=self._is_weak)
         if not is_relayed and self._knows(src, at):
             self._rate.heard(src, at)
+            if doppler_hz is not None:
+                self._motion.note(src, doppler_hz, at)
         qos = CLASSES[pdu.qos]
         by_request = self._access.by_request is not None
         uses = self._access.others_follow or (by_request and not is_relayed)

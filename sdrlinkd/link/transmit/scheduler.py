@@ -29,6 +29,7 @@ from sdrlinkd.link.transmit.bids import ROOM, Bid, Bids
 from sdrlinkd.link.transmit.burst import Burst, Outcome
 from sdrlinkd.link.transmit.control_records import ControlRecords
 from sdrlinkd.link.transmit.fit import Fit
+from sdrlinkd.link.transmit.motion import Motion, Moves, longest_burst_s
 from sdrlinkd.link.transmit.overheard import Knows, Overheard
 from sdrlinkd.link.transmit.own_turns import OwnTurns
 from sdrlinkd.link.transmit.rate import HeardThere
@@ -101,6 +102,7 @@ class BurstScheduler:
         """Present capacity of the channel in payload bytes per s; infinity while unknown."""
         self._shares = Shares(classes)
         self._limits = Limits(classes, forecasts)
+        self._motion = Motion()
         self._held = _NOT_HELD
         self._repetitions = Repetitions(answers, composer, sealing)
         self._has_repeated = False
@@ -116,7 +118,7 @@ class BurstScheduler:
         self._adopt()
         self._pulse_s = fit.pulse_s
         self._overheard = Overheard(
-            fit, self._forecasts, self._own_id, self._has_control, self._knows
+            fit, self._forecasts, self._motion, self._own_id, self._has_control, self._knows
         )
 
     def _adopt(self) -> None:
@@ -372,6 +374,22 @@ class BurstScheduler:
         """How robot `src` hears us, and the MCS with which we send to it."""
         return self._rate.heard_there(src)
 
+    def moves(self, src: int, now: float) -> Moves:
+        """How fast the channel to robot `src` changes, and how that bounds bursts."""
+        bounding = self._motion.bounding(max(self._fit.longest_burst_s), now)
+        bound_s = longest_burst_s(bounding[src]) if src in bounding else None
+        return Moves(self._motion.doppler_hz(src, now), bound_s)
+
+    def moves_words(self, now: float) -> list[str]:
+        """Sentences on the bursts that are short because channels change."""
+        return [
+            f"bursts to robot {src} are at most {1e3 * longest_burst_s(doppler_hz):.2g} ms long: "
+            f"the channel to it changes at {doppler_hz:.2g} Hz, as on the move"
+            for src, doppler_hz in self._motion.bounding(
+                max(self._fit.longest_burst_s), now
+            ).items()
+        ]
+
     def report(self) -> TransmitReport:
         """The report on what was sent so far, and how."""
         rate = self._rate
@@ -492,7 +510,10 @@ class BurstScheduler:
             self.bytes_per_s = self._composer.k_single / (two_s - one_s)
         if further is not None:
             asked.add(further)
-        most_s = longest_s if made_by is None else min(longest_s, max(one_s, made_by(slot.start)))
+        most_s = self._motion.longest_s(self._outbox.destinations(), slot.start)
+        if made_by is not None:
+            most_s = min(most_s, made_by(slot.start))
+        most_s = min(longest_s, max(one_s, most_s))
         if self._turns is not None:
             # Turns are short enough for what is urgent.
             most = opportunity.most_pdus(mcs, most_s)

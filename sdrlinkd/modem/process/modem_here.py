@@ -255,7 +255,11 @@ class ModemHere:
         self._on_block()
         rate = self._params.rate_hz
         heard = [
-            Heard(pdu.data, pdu.burst.start / rate, pdu.burst.snr_db, pdu.at / rate) for pdu in pdus
-        ]
+            Heard(
+                pdu.data, pdu.burst.start / rate, pdu.burst.snr_db, pdu.at / rate,
+                None if pdu.doppler is None else pdu.doppler * rate,
+            )
+            for pdu in pdus
+        ]  # fmt: skip
         if self._user is not None:
             self._user.delivered(heard, end)
