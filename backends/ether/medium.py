@@ -9,7 +9,7 @@ import numpy as np
 from backends.base import Samples, TxBurst
 from backends.ether.ear import Ear, Piece
 from backends.ether.way import Way
-from backends.ether.world import AirParams, RadioParams, World
+from backends.ether.world import SPEED_OF_LIGHT, AirParams, RadioParams, World
 from backends.outstanding import GAP
 from phy import Path, PathParams
 
@@ -150,6 +150,7 @@ class Medium:
             loss_db=power_db - NOISE_DBFS - hop.snr_db,
             delay_s=part / self._air.rate_hz,
             clock_ppm=sender.radio.clock_ppm - to.radio.clock_ppm + hop.doppler_ppm,
+            doppler_hz=hop.speed_m_s * self._air.frequency_hz / SPEED_OF_LIGHT,
         )
         return Arrival(to_id, whole, way)
 

@@ -11,3 +11,4 @@ class Way(NamedTuple):
     loss_db: float
     delay_s: float
     clock_ppm: float
+    doppler_hz: float = 0.0

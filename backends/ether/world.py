@@ -22,7 +22,7 @@ class AirParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     rate_hz: Annotated[float, Meta(ge=1e4, le=2e8)] = 5e6
     frequency_hz: Annotated[float, Meta(ge=0, le=1e11)] = 2.45e9
     profile: Literal["awgn", "rayleigh", "tdl-a", "tdl-c"] = "awgn"
-    """A single path, or echoes that fade anew for each burst."""
+    """A single path, or echoes that fade anew for each burst, and within it as the nodes move."""
     delay_spread_s: Annotated[float, Meta(ge=0, le=1e-3)] = 1e-7
     snr_db: Decibel = 20.0
     """SNR between nodes without positions, unless a link overrides it."""
@@ -73,6 +73,8 @@ class Hop(NamedTuple):
     snr_db: float
     delay_s: float
     doppler_ppm: float
+    speed_m_s: float = 0.0
+    """How fast the nodes move relative to each other, in any direction."""
 
 
 class Track:
@@ -121,7 +123,7 @@ class World:
         if self.is_out(t) or self.is_off(sender, t) or self.is_off(receiver, t):
             return None
         link = self._links.get((sender, receiver))
-        distance_m, speed = self._distance(sender, receiver, t)
+        distance_m, away_m_s, speed_m_s = self._distance(sender, receiver, t)
         delay_s = distance_m / SPEED_OF_LIGHT + (link.delay_s if link else 0.0)
         snr_db = link.snr_db if link else None
         if snr_db is None:
@@ -132,7 +134,7 @@ class World:
                 snr_db = self._air.snr_db_at_1m - loss_db
         if snr_db <= -300:
             return None
-        return Hop(snr_db, delay_s, -1e6 * speed / SPEED_OF_LIGHT)
+        return Hop(snr_db, delay_s, -1e6 * away_m_s / SPEED_OF_LIGHT, speed_m_s)
 
     def is_out(self, t: float) -> bool:
         """Whether there is an outage at `t`."""
@@ -143,14 +145,18 @@ class World:
         times = self._off.get(node)
         return times is not None and times.hold(t)
 
-    def _distance(self, sender: int, receiver: int, t: float) -> tuple[float, float]:
-        """(distance in m, its rate of growth in m/s); 0 if the positions are unknown."""
+    def _distance(self, sender: int, receiver: int, t: float) -> tuple[float, float, float]:
+        """(distance in m, its rate of growth, relative speed in m/s); 0 without positions."""
         one, other = self._tracks.get(sender), self._tracks.get(receiver)
         if one is None or other is None:
-            return 0.0, 0.0
+            return 0.0, 0.0, 0.0
         step_s = 0.01
-        now, then = (math.dist(one.at(each), other.at(each)) for each in (t, t + step_s))
-        return now, (then - now) / step_s
+        (x0, y0), (x1, y1) = (
+            tuple(a - b for a, b in zip(one.at(each), other.at(each), strict=True))
+            for each in (t, t + step_s)
+        )
+        now, then, moved = math.hypot(x0, y0), math.hypot(x1, y1), math.hypot(x1 - x0, y1 - y0)
+        return now, (then - now) / step_s, moved / step_s
 
 
 class _Times:

@@ -239,3 +239,22 @@ def test_a_receiver_finds_a_burst_where_the_clocks_say(sends_ppm, hears_ppm, joi
     arrives = (sent_at + delay_s - joined_at) * RATE * (1 + 1e-6 * hears_ppm)
     assert told[0].burst.start == pytest.approx(arrives, abs=1)
     assert told[0].burst.snr_db == pytest.approx(20, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "least", "most"), [(0.0, 0, 1e-3), (2.0, 0.005, 0.1), (20.0, 0.2, 0.8)]
+)
+def test_echoes_change_within_a_burst_as_fast_as_nodes_move(speed_m_s, least, most):
+    """The share of a carrier's power by which its magnitude changes in 4 ms: 0, 16, 160 Hz."""
+    tracks = {
+        0: Track([(0.0, 0.0, 0.0)]),
+        1: Track([(0.0, 0.0, 10.0), (100.0, 100 * speed_m_s, 10.0)]),
+    }
+    made = medium(2, tracks=tracks.items(), profile="rayleigh", snr_db_at_1m=80.0)
+    changes, powers = [], []
+    for i in range(200):
+        made.send(0, TxBurst(6000 * i + 500, np.ones(5000, np.complex64)))
+        x = np.abs(heard(made, 1, 6e-3 * (i + 1))[600:5400])
+        changes.append(np.mean((x[:-4000] - x[4000:]) ** 2))
+        powers.append(np.mean(x**2))
+    assert least <= np.mean(changes) / np.mean(powers) <= most

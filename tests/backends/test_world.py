@@ -90,7 +90,7 @@ def test_nearer_than_a_metre_is_a_metre():
 @pytest.mark.parametrize("known", [{}, {1: Track([(0.0, 100.0, 0.0)])}])
 def test_without_both_places_there_is_the_snr_of_the_air_and_no_delay(known):
     world = World(AIR, known)
-    assert world.hop(1, 2, 5.0) == world.hop(2, 1, 5.0) == (17.0, 0.0, 0.0)
+    assert world.hop(1, 2, 5.0) == world.hop(2, 1, 5.0) == (17.0, 0.0, 0.0, 0.0)
 
 
 def test_an_override_holds_both_ways():
@@ -156,7 +156,21 @@ def test_what_comes_nearer_is_heard_higher_and_what_goes_away_lower():
 
 def test_who_moves_along_together_has_no_doppler():
     tracks = {i: Track([(0.0, 10.0 * i, 0.0), (1.0, 10.0 * i + 500, 0.0)]) for i in (0, 1)}
-    assert World(AIR, tracks).hop(0, 1, 0.5).doppler_ppm == pytest.approx(0, abs=1e-9)
+    hop = World(AIR, tracks).hop(0, 1, 0.5)
+    assert (hop.doppler_ppm, hop.speed_m_s) == pytest.approx((0, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize(("other", "speed_m_s"), [((0, 3), 5), ((5, 3), 0), ((-5, 3), 10)])
+def test_echoes_change_as_fast_as_two_move_past_each_other(other, speed_m_s):
+    """Even where the distance does not change, as when they are side by side."""
+    per_s, beside = other
+    tracks = {
+        0: Track([(0.0, -50.0, 0.0), (20.0, 50.0, 0.0)]),
+        1: Track([(0.0, -10.0 * per_s, beside), (20.0, 10.0 * per_s, beside)]),
+    }
+    hop = World(AIR, tracks).hop(0, 1, 10.0)
+    assert hop.speed_m_s == pytest.approx(speed_m_s)
+    assert abs(hop.doppler_ppm) < 0.01
 
 
 def test_an_outage_begins_with_its_first_moment_and_ends_before_its_last():

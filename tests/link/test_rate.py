@@ -1,5 +1,6 @@
 """The MCS of a burst follows neighbors' reports, neither too fast nor oscillating."""
 
+from math import log10
 from random import Random
 
 import pytest
@@ -226,3 +227,69 @@ def test_only_the_last_changes_are_kept():
     assert len(rate.changes) == KEPT_CHANGES
     last = rate.changes[-1]
     assert (last.at, last.node, last.mcs) == (2 * KEPT_CHANGES - 1, 2, 6)
+
+
+def hear(rate, src, snrs_db, at=0.0):
+    """Bursts of `src` come, with these SNRs, 0.01 s apart; returns when the last one did."""
+    for snr_db in snrs_db:
+        at += 0.01
+        rate.heard(src, at, snr_db)
+    return at
+
+
+def faded(mean_db, n, seed=1):
+    """The SNR of bursts on a Rayleigh channel."""
+    rng = Random(seed)
+    return [mean_db + 10 * log10(rng.expovariate(1.0)) for _ in range(n)]
+
+
+@pytest.mark.parametrize("spread_db", [0.0, 0.8])
+def test_where_the_snr_is_steady_there_is_no_further_margin(spread_db):
+    steady, rate, rng = make(), make(), Random(1)
+    hear(rate, 2, [20 + rng.uniform(-spread_db, spread_db) for _ in range(300)])
+    for each in (steady, rate):
+        tell(each, 2, 20.0, at=4.0)
+    assert [choice(rate, qos=q, at=4.0) for q in Qos] == [
+        choice(steady, qos=q, at=4.0) for q in Qos
+    ]
+
+
+def test_where_it_fades_few_bursts_are_lost_and_of_urgent_ones_the_fewest():
+    rate, mean_db = make(), 24.0
+    at = hear(rate, 2, faded(mean_db, 300))
+    tell(rate, 2, mean_db - 2.5, at=at)
+    later = faded(mean_db, 20_000, 2)
+    lost = {
+        qos: sum(snr_db < NEEDED[choice(rate, qos=qos, at=at)] for snr_db in later) / len(later)
+        for qos in Qos
+    }
+    assert choice(rate, qos=Qos.URGENT, at=at) == 0
+    assert lost[Qos.URGENT] < 0.01
+    assert lost[Qos.LATENCY] < 0.03
+    assert lost[Qos.BULK] < 0.15
+    steady = make()
+    tell(steady, 2, mean_db - 2.5)
+    assert choice(rate, at=at) < choice(steady)
+
+
+def test_pdus_of_one_burst_say_no_more_than_one():
+    one, many = make(), make()
+    for i, snr_db in enumerate(faded(24.0, 200)):
+        for rate, n in ((one, 1), (many, 9)):
+            for _ in range(n):
+                rate.heard(2, 0.01 * i, snr_db)
+    for rate in (one, many):
+        tell(rate, 2, 21.0, at=3.0)
+    assert choice(one, at=3.0) == choice(many, at=3.0)
+
+
+def test_a_hundred_steady_bursts_take_the_margin_back_and_one_step_adds_none():
+    fresh, rate, stepped = make(), make(), make()
+    at = hear(rate, 2, faded(24.0, 200))
+    at = hear(rate, 2, [20.0] * 100, at)
+    hear(stepped, 2, [40.0] * 50 + [20.0])
+    for each in (fresh, rate, stepped):
+        tell(each, 2, 20.0, at=at)
+    for qos in (Qos.URGENT, Qos.DEFAULT):
+        assert choice(rate, qos=qos, at=at) == choice(stepped, qos=qos, at=at)
+        assert choice(rate, qos=qos, at=at) == choice(fresh, qos=qos, at=at)

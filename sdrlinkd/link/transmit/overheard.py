@@ -38,7 +38,7 @@ class Overheard:
         self._is_weak = snr_db is not None and self._too_weak(snr_db)
         self._access.heard(src, at, is_relayed, is_weak=self._is_weak)
         if not is_relayed and self._knows(src, at):
-            self._rate.heard(src, at)
+            self._rate.heard(src, at, snr_db)
             if doppler_hz is not None:
                 self._motion.note(src, doppler_hz, at)
         qos = CLASSES[pdu.qos]

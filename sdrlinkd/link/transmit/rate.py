@@ -18,6 +18,14 @@ HIGH_PER, LOW_PER = 0.1, 0.02
 PENALTY_STEP_DB = 1.0
 PENALTY_DECAY_DB = 0.5
 SNR_STEP_DB = 0.25
+SWING_WEIGHT = 0.05
+"""Weight of the newest burst in the swing of a neighbor's SNR."""
+STEADY_DB = 1.0
+"""Swing in dB that estimates of a steady SNR have."""
+SPREADS = {Qos.URGENT: 6.0, Qos.LATENCY: 2.5, Qos.DEFAULT: 1.5, Qos.BULK: 1.5}
+"""Standard deviations of a fading SNR that are kept as a margin. On Rayleigh fading, 7 % of the
+bursts fall below that of bulk, 1 % below that of latency. Urgent messages are small and cannot wait
+to be repeated, so they get as much as there is."""
 KEPT_CHANGES = 256
 
 
@@ -67,9 +75,24 @@ class _Peer:
     heard_at: float
     told_at: float = float("-inf")
     snr_db: float = 0.0
+    here_db: float | None = None
+    swing_db: float = 0.0
+    """SNR in dB of its last burst here, and mean change from burst to burst: ours fade as they do.
+    The mean of the changes themselves, as one large one, when an obstacle comes, is no fading."""
     per: float = 0.0
     penalty_db: float = 0.0
-    chosen: dict[bool, int] = field(default_factory=dict)
+    chosen: dict[Qos, int] = field(default_factory=dict)
+
+    def note_here(self, snr_db: float) -> None:
+        """Note the SNR of one of its bursts."""
+        if self.here_db is not None:
+            self.swing_db += SWING_WEIGHT * (abs(snr_db - self.here_db) - self.swing_db)
+        self.here_db = snr_db
+
+    @property
+    def fades_db(self) -> float:
+        """About the standard deviation in dB by which its SNR fades."""
+        return max(0.0, self.swing_db - STEADY_DB)
 
 
 class RateControl:
@@ -97,13 +120,14 @@ class RateControl:
         self.changes: deque[RateChange] = deque(maxlen=KEPT_CHANGES)
         """Latest changes of the MCS for default and bulk."""
 
-    def heard(self, src: int, now: float) -> None:
-        """Note that robot `src` was heard at `now`."""
+    def heard(self, src: int, now: float, snr_db: float | None = None) -> None:
+        """Note that robot `src` was heard at `now`, with this SNR."""
         peer = self._peers.get(src)
         if peer is None:
-            self._peers[src] = _Peer(now)
-        else:
-            peer.heard_at = now
+            peer = self._peers[src] = _Peer(now)
+        if snr_db is not None and peer.heard_at != now:
+            peer.note_here(snr_db)
+        peer.heard_at = now
 
     def take(self, src: int, report: LinkReport, now: float) -> None:
         """Take the report of robot `src` on how well it hears us."""
@@ -132,7 +156,7 @@ class RateControl:
         if BROADCAST not in wanted:
             present = {src: peer for src, peer in present.items() if src in wanted}
         return min(
-            (self._choose(src, peer, qos <= Qos.LATENCY, now) for src, peer in present.items()),
+            (self._choose(src, peer, min(qos, Qos.DEFAULT), now) for src, peer in present.items()),
             default=self._lowest,
         )
 
@@ -145,24 +169,25 @@ class RateControl:
         peer = self._peers.get(src)
         if peer is None:
             return HeardThere(None, None, self.lowest)
-        mcs = peer.chosen.get(False, self.lowest)
+        mcs = peer.chosen.get(Qos.DEFAULT, self.lowest)
         if peer.told_at < 0:
             return HeardThere(None, None, mcs)
         return HeardThere(peer.snr_db, peer.per, mcs)
 
-    def _choose(self, src: int, peer: _Peer, is_urgent: bool, now: float) -> int:
+    def _choose(self, src: int, peer: _Peer, qos: Qos, now: float) -> int:
         params = self._params
-        before = peer.chosen.get(is_urgent, self._lowest)
+        before = peer.chosen.get(qos, self._lowest)
         if now - peer.told_at > params.stale_s:
             best = self._lowest
         else:
-            margin = params.urgent_margin_db if is_urgent else params.margin_db
+            margin = params.urgent_margin_db if qos <= Qos.LATENCY else params.margin_db
+            margin += SPREADS[qos] * peer.fades_db
             usable = peer.snr_db - margin - peer.penalty_db
             best = self._best(usable)
             if best > before:
                 best = max(before, self._best(usable - params.hysteresis_db))
-        peer.chosen[is_urgent] = best
-        if best != before and not is_urgent:
+        peer.chosen[qos] = best
+        if best != before and qos is Qos.DEFAULT:
             self.changes.append(RateChange(now, src, best))
         return best
 
