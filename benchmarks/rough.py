@@ -10,8 +10,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.absent import attempt
+from benchmarks.peers.modems import Liquid
 from benchmarks.report import Row, exactly, main
-from benchmarks.trials import Air, ErrorRate, bursts, lost_of
+from benchmarks.trials import LEAD_IN, Air, ErrorRate, bursts, frames, lost_of
 from phy import SENSE_WINDOW, EnergyDetector, PduHeard, Receiver, Transmitter
 
 QPSK12, QAM64_34 = 1, 6
@@ -26,6 +28,7 @@ _MOVING = (
     (1e6, 40.0, 5, 64, 0.01),
     (1e6, 40.0, 4, 220, 0.02),
 )
+_LIQUID_FRAMES, _LIQUID_PPM = 300, 1.0
 _PATIENCE_S = 0.04
 """As the modem of a daemon has it."""
 
@@ -43,7 +46,14 @@ def _rows(seed: int, quick: bool) -> Iterator[Row]:
         yield _deaf_receiver(rate_hz, seed)
         yield _deaf_carrier_sense(rate_hz, seed)
     for place in _MOVING:
-        yield _moving(*place, seed, quick)
+        row = _moving(*place, seed, quick)
+        rate_hz, doppler_hz, n_pdus, n_bytes, _ = place
+        if n_pdus == 1:
+            with attempt("liquid-dsp"):
+                # It finds no frame whose carrier is off by more than half a subcarrier.
+                air = Air(rate_hz, profile="tdl-a", doppler_hz=doppler_hz, ppm=_LIQUID_PPM)
+                row.peers["liquid-dsp g2412, equal clocks"] = _liquid_lost(air, n_bytes)
+        yield row
     for step_db in (-3.0, -6.0):
         yield _step(step_db, seed, quick)
     yield _false_pdus(seed, 10**6 if quick else 10**8)
@@ -126,6 +136,18 @@ def _moving(
     lost = lost_of(air, stream, n, n * n_pdus)
     name = f"doppler_{doppler_hz:.0f}hz_{n_pdus}x{n_bytes}B_{rate_hz * 1e-6:.0f}msps_lost"
     return _lost(name, lost, target, "TDL-A 100 ns, 25 dB, QPSK 1/2, each burst whole", quick)
+
+
+def _liquid_lost(air: Air, n_bytes: int) -> float:
+    """The share of frames that liquid-dsp loses on the same channel, with QPSK and rate 1/2."""
+    liquid, heard, seed = Liquid(), 0, 1
+    wave = liquid.frame("g2412", 2, n_bytes, seed)
+    wave /= np.sqrt(np.mean(np.abs(wave) ** 2))
+    stream = frames(air, wave, SNR_DB, seed)
+    for _ in range(0, _LIQUID_FRAMES, 50):
+        parts = [x for _, x in zip(range(50), stream, strict=False)]
+        heard += liquid.heard(n_bytes, seed, np.concatenate([*parts, parts[0][:LEAD_IN]]))
+    return 1 - heard / _LIQUID_FRAMES
 
 
 def _step(step_db: float, seed: int, quick: bool) -> Row:

@@ -21,7 +21,7 @@ CONFIDENCE = 0.95
 class Air:
     """The channel between a transmitter and a receiver of bursts.
 
-    The crystals differ by ±40 ppm, which shifts centre frequency and sample rate. The transmitter
+    The crystals differ by ±`ppm`, which shifts centre frequency and sample rate. The transmitter
     has an image of -36 dB and a leak of -35 dBc. The receiver has an image of -34 dB, DC of -25 dBc
     and 8 bits, with bursts at -15 dBFS. The oscillators have -90 dBc/Hz at 10 kHz.
     """
@@ -30,6 +30,7 @@ class Air:
     centre_hz: float = 2.4e9
     profile: str = "awgn"
     doppler_hz: float = 0.0
+    ppm: float = PPM
 
 
 def bursts(
@@ -41,27 +42,47 @@ def bursts(
     drawn anew for each burst; its mean power counts.
     """
     rng = np.random.default_rng(seed)
-    transmitter = Transmitter()
+    transmitter, front_end = Transmitter(), _front_end(snr_db, rng)
+    while True:
+        pdus = [rng.bytes(n_bytes) for _ in range(n_pdus)]
+        yield pdus, _received(air, transmitter.modulate(pdus, mcs), front_end, rng)
+
+
+def frames(
+    air: Air, wave: NDArray[np.complex64], snr_db: float, seed: int
+) -> Iterator[NDArray[np.complex64]]:
+    """Another modem's frame `wave` `[n]` of mean power 1, again and again, as in `bursts`."""
+    rng = np.random.default_rng(seed)
+    front_end = _front_end(snr_db, rng)
+    while True:
+        yield _received(air, wave, front_end, rng)
+
+
+def _front_end(snr_db: float, rng: np.random.Generator) -> FrontEnd:
     front = FrontEndParams(
         noise_dbfs=LEVEL_DBFS - snr_db, image_db=34.0, dc_dbfs=LEVEL_DBFS - 25.0, bits=8
     )
-    front_end = FrontEnd(front, rng)
-    while True:
-        pdus = [rng.bytes(n_bytes) for _ in range(n_pdus)]
-        params = PathParams(
-            rate_hz=air.rate_hz,
-            centre_hz=air.centre_hz,
-            profile=air.profile,
-            doppler_hz=air.doppler_hz,
-            clock_ppm=rng.uniform(-PPM, PPM),
-            loss_db=-LEVEL_DBFS,
-            image_db=36.0,
-            leak_db=35.0,
-            phase_noise_dbc_hz=-90.0,
-        )
-        _, x = Path(params, rng).carry(transmitter.modulate(pdus, mcs))
-        lead = np.zeros(LEAD_IN + int(rng.integers(64)), np.complex64)
-        yield pdus, front_end.receive(np.concatenate((lead, x.astype(np.complex64))))
+    return FrontEnd(front, rng)
+
+
+def _received(
+    air: Air, wave: NDArray[np.complex64], front_end: FrontEnd, rng: np.random.Generator
+) -> NDArray[np.complex64]:
+    """What a receiver samples of a burst, after some noise."""
+    params = PathParams(
+        rate_hz=air.rate_hz,
+        centre_hz=air.centre_hz,
+        profile=air.profile,
+        doppler_hz=air.doppler_hz,
+        clock_ppm=rng.uniform(-air.ppm, air.ppm),
+        loss_db=-LEVEL_DBFS,
+        image_db=36.0,
+        leak_db=35.0,
+        phase_noise_dbc_hz=-90.0,
+    )
+    _, x = Path(params, rng).carry(wave)
+    lead = np.zeros(LEAD_IN + int(rng.integers(64)), np.complex64)
+    return front_end.receive(np.concatenate((lead, x.astype(np.complex64))))
 
 
 @dataclass(frozen=True)
@@ -95,7 +116,7 @@ def lost_of(
     air: Air, stream: Iterator[tuple[list[bytes], NDArray[np.complex64]]], n: int, enough: int
 ) -> ErrorRate:
     """Count the PDUs that are lost of the first `n` bursts, or until `enough` are."""
-    receiver = Receiver(max_frequency=PPM * 1e-6 * air.centre_hz / air.rate_hz)
+    receiver = Receiver(max_frequency=air.ppm * 1e-6 * air.centre_hz / air.rate_hz)
     tried, errors, missing = 0, 0, set[bytes]()
     for _, (pdus, x) in zip(range(n), stream, strict=False):
         heard = {event.data for event in receiver.push(x) if isinstance(event, PduHeard)}

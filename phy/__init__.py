@@ -24,7 +24,15 @@ from phy.quality import COUNTERS, BurstOver, BurstQuality, Claim, Event, PduHear
 from phy.sizes import N_PULSE, SENSE_WINDOW
 
 if TYPE_CHECKING:
-    from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
+    from phy.channel import (
+        PROFILES,
+        FrontEnd,
+        FrontEndParams,
+        Jammer,
+        JammerParams,
+        Path,
+        PathParams,
+    )
     from phy.engine import Engine, EngineError
     from phy.oversampling import REACH, Downsampler, upsample
     from phy.pulses import pulse
@@ -59,6 +67,8 @@ __all__ = [
     "Expected",
     "FrontEnd",
     "FrontEndParams",
+    "Jammer",
+    "JammerParams",
     "Mcs",
     "Modulation",
     "Numerology",
@@ -80,7 +90,15 @@ __all__ = [
 ]
 
 _LATER = {
-    "phy.channel": ("PROFILES", "FrontEnd", "FrontEndParams", "Path", "PathParams"),
+    "phy.channel": (
+        "PROFILES",
+        "FrontEnd",
+        "FrontEndParams",
+        "Jammer",
+        "JammerParams",
+        "Path",
+        "PathParams",
+    ),
     "phy.engine": ("Engine", "EngineError"),
     "phy.oversampling": ("REACH", "Downsampler", "upsample"),
     "phy.pulses": ("pulse",),

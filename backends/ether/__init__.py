@@ -13,6 +13,7 @@ from backends.ether.watch import HubWatch
 from backends.ether.world import (
     AirParams,
     Hop,
+    JammerParams,
     LinkOverride,
     Outage,
     RadioParams,
@@ -36,6 +37,7 @@ __all__ = [
     "EtherRadio",
     "Hop",
     "HubWatch",
+    "JammerParams",
     "LinkOverride",
     "LocalEther",
     "LocalRadio",

@@ -1,6 +1,7 @@
 """One node's radio on a simulated air: makes blocks of what arrives, and tracks its bursts."""
 
 import asyncio
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,10 @@ from backends.base import SENDING, Capabilities, RxBlock, TxBurst, TxOutcome, Tx
 from backends.ether import protocol
 from backends.ether.ear import Piece
 from backends.ether.medium import NOISE_DBFS
-from backends.ether.world import RadioParams
+from backends.ether.world import JammerParams, RadioParams
 from backends.outstanding import NEVER
-from phy import FrontEnd, FrontEndParams
+from phy import FrontEnd, FrontEndParams, Jammer
+from phy import JammerParams as Jamming
 
 NOTHING_DB = 300.0
 
@@ -30,8 +32,12 @@ class Antenna:
     Without time stamps, each gap shifts the radio's count a little, and with it all later indices.
     """
 
-    def __init__(self, radio: RadioParams, seed: int, rate_hz: float) -> None:
+    def __init__(
+        self, radio: RadioParams, seed: int, rate_hz: float, jammers: Sequence[JammerParams] = ()
+    ) -> None:
         self._radio = radio
+        # All receive the same, so their waveforms have one seed.
+        self._jammers = [Jammer(_jammer(each), rate_hz, i) for i, each in enumerate(jammers)]
         self._index_error = 0 if radio.timestamps else round(radio.index_error_s * rate_hz)
         self._rng = np.random.Generator(np.random.SFC64(seed))
         front_end = FrontEndParams(
@@ -81,6 +87,8 @@ class Antenna:
             if piece.samples is None and len(self._zeros) < n:
                 self._zeros = np.zeros(n, np.complex64)
             heard = self._zeros[:n] if piece.samples is None else piece.samples
+            for jammer in self._jammers:
+                heard = jammer.add(heard, first - self._shift)
             samples = self._front_end.receive(heard)
         self._was_deaf = piece.is_deaf
         self.next_index = first + n
@@ -164,3 +172,10 @@ class Antenna:
         slip = max(slip, 1 - n)
         self._shift += slip
         return slip
+
+
+def _jammer(params: JammerParams) -> Jamming:
+    return Jamming(
+        params.kind, NOISE_DBFS + params.over_noise_db, params.offset_hz, params.width_hz,
+        params.period_s, params.duty, tuple((begin, end) for begin, end in params.times),
+    )  # fmt: skip

@@ -153,6 +153,7 @@ class EtherHub:
             block_s=self._air.block_s,
             host_ns=round(1e9 * (self._began + self._now)),
             paced=self._paced,
+            jammers=self._air.jammer,
             air=f"{self._air.profile} air of {self._air.rate_hz / 1e6:g} Msps"
             + ("" if self._paced else ", lock-step"),
         )

@@ -65,7 +65,8 @@ class LocalRadio:
     def __init__(self, ether: LocalEther, node_id: int, radio: RadioParams, seed: int) -> None:
         self._ether = ether
         self._node_id = node_id
-        self.antenna = Antenna(radio, seed * 256 + node_id, ether.air.rate_hz)
+        air = ether.air
+        self.antenna = Antenna(radio, seed * 256 + node_id, air.rate_hz, air.jammer)
         self.queue: asyncio.Queue[RxBlock | None] = asyncio.Queue()
         self._number = 0
         self._is_open = False

@@ -17,7 +17,7 @@ from msgspec import Meta
 
 from backends.base import Samples
 from backends.ether.way import Way
-from backends.ether.world import RadioParams
+from backends.ether.world import JammerParams, RadioParams
 
 VERSION = 2
 
@@ -43,6 +43,7 @@ class Welcome(msgspec.Struct, tag=True, frozen=True, kw_only=True):
     """Monotonic time of the radio's index 0."""
     paced: bool
     air: str
+    jammers: list[JammerParams] = []
 
 
 class Refused(msgspec.Struct, tag=True, frozen=True, kw_only=True):

@@ -112,7 +112,7 @@ class EtherRadio:
         self._is_idle.clear()
         await asyncio.to_thread(self._ask)
         welcome = self._welcome
-        self._antenna = Antenna(welcome.radio, welcome.seed, tuning.rate_hz)
+        self._antenna = Antenna(welcome.radio, welcome.seed, tuning.rate_hz, welcome.jammers)
         if welcome.paced:
             self._real_time = RealTime(
                 self._down, self._hello(), welcome, self._antenna, self._clock, self.counters,

@@ -16,6 +16,23 @@ NEVER_OFF: Mapping[int, Sequence["Outage"]] = {}
 Decibel = Annotated[float, Meta(ge=-300, le=300)]
 
 
+class JammerParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A signal that disturbs all nodes; frequencies in Hz from the channel's centre, times in s."""
+
+    kind: Literal["tone", "narrow", "sweep", "pulses", "noise"] = "tone"
+    """A carrier, noise `width_hz` wide, a carrier that goes through `width_hz` in each `period_s`,
+    noise in a share `duty` of each `period_s`, or noise in the whole band."""
+    over_noise_db: Decibel = 30.0
+    """Its mean power while it sends, over a receiver's noise in the band."""
+    offset_hz: Annotated[float, Meta(ge=-1e8, le=1e8)] = 0.0
+    width_hz: Annotated[float, Meta(ge=0, le=2e8)] = 0.0
+    """0: the whole band, for a sweep."""
+    period_s: Annotated[float, Meta(gt=0, le=1e3)] = 0.01
+    duty: Annotated[float, Meta(gt=0, le=1)] = 0.02
+    times: list[Annotated[list[float], Meta(min_length=2, max_length=2)]] = []
+    """When it sends, as [begin, end]; []: always."""
+
+
 class AirParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The shared air. SNR is mean burst power over the receiver's noise in the band."""
 
@@ -31,6 +48,8 @@ class AirParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     path_loss_exponent: Annotated[float, Meta(ge=0, le=8)] = 2.0
     block_s: Annotated[float, Meta(ge=1e-5, le=0.1)] = 0.001
     """Length of the pieces in which samples are handed out."""
+    jammer: list[JammerParams] = []
+    """Signals of others, which all nodes receive alike."""
 
 
 class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

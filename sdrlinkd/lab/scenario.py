@@ -181,6 +181,9 @@ def _check(scenario: Scenario, source: str) -> None:
             )
     periods = [("outages.times", each) for each in scenario.outages.times]
     periods += [
+        ("air.jammer.times", each) for jammer in scenario.air.jammer for each in jammer.times
+    ]
+    periods += [
         (f"robot.off of robot {robot.id}", each) for robot in scenario.robot for each in robot.off
     ]
     for key, (begin, end) in periods:
@@ -192,6 +195,9 @@ def _check(scenario: Scenario, source: str) -> None:
 
 def _check_numbers(scenario: Scenario, source: str) -> None:
     lists = [("outages.times", times) for times in scenario.outages.times]
+    lists += [
+        ("air.jammer.times", times) for jammer in scenario.air.jammer for times in jammer.times
+    ]
     lists += [("robot.off", times) for robot in scenario.robot for times in robot.off]
     lists += [("robot.path", place) for robot in scenario.robot for place in robot.path]
     for key, numbers in lists:

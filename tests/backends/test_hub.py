@@ -14,13 +14,14 @@ from backends import (
     EtherHub,
     EtherRadio,
     HubWatch,
+    JammerParams,
     RadioParams,
     Tuning,
     TxBurst,
     World,
     hub_in,
 )
-from backends.testing import AIR, CONSTANTS, SKY, protocol
+from backends.testing import AIR, CONSTANTS, NOISE_DBFS, SKY, protocol
 from tests.backends.hubs import RawRadio, ask, hub_air, serving, until
 from tests.backends.radios import (
     RATE,
@@ -64,6 +65,13 @@ async def test_radios_join_hear_each_other_and_leave(tmp_path):
     where = np.flatnonzero(np.abs(samples) > 1e-3)
     assert first <= where[0] < where[-1] < first + 300
     assert len(where) > 290
+
+
+async def test_a_hub_tells_its_radios_of_jammers(tmp_path):
+    with serving(tmp_path, jammer=[JammerParams(over_noise_db=40.0)]):
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
+            got = heard(await take(radio.blocks(), 5000))
+    assert 10 * np.log10(np.mean(np.abs(got) ** 2)) == pytest.approx(NOISE_DBFS + 40, abs=0.1)
 
 
 async def test_a_block_ends_where_a_burst_has_arrived_unless_it_is_late(tmp_path):

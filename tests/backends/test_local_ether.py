@@ -6,7 +6,16 @@ from random import Random
 import numpy as np
 import pytest
 
-from backends import GAP, BackendError, LinkOverride, RadioParams, Tuning, TxBurst, TxOutcome
+from backends import (
+    GAP,
+    BackendError,
+    JammerParams,
+    LinkOverride,
+    RadioParams,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+)
 from backends.testing import LEAD, NOISE_DBFS
 from tests.backends.airs import CENTRE_HZ, PLAIN, RATE, burst, half_duplex, power_db
 from tests.backends.nodes import (
@@ -65,6 +74,21 @@ async def test_bursts_arrive_above_a_radios_own_noise_by_their_snr():
     assert quiet == pytest.approx(NOISE_DBFS, abs=0.15)
     assert both == pytest.approx(NOISE_DBFS + 10 * np.log10(10**1.3 + 1), abs=0.1)
     assert not np.array_equal(got[:N], line_of(taken[0])[:N]), "each has noise of its own"
+
+
+async def test_all_hear_a_jammer_alike_and_only_while_it_sends():
+    """A half-duplex radio, too, whose own bursts leave gaps in what it hears."""
+    jammer = JammerParams(over_noise_db=40.0, offset_hz=1e5, times=[[0.01, 0.02]])
+    ether = ether_of({0: half_duplex(0.0003), 1: PLAIN}, snr_db=-300.0, jammer=[jammer])
+    wanted = [(N, TxBurst(12_000, noise(2000)))]
+    taken = await run(ether, 0.03, {0: sending(ether.radios[0], wanted, [])})
+    got, other = line_of(taken[1]), line_of(taken[0])
+    on = slice(10_000, 20_000)
+    assert power_db(got[on]) == pytest.approx(NOISE_DBFS + 40, abs=0.05)
+    for off in (slice(0, 10_000), slice(20_000, 30_000)):
+        assert power_db(got[off]) == pytest.approx(NOISE_DBFS, abs=0.15)
+    late = slice(15_000, 20_000)
+    assert np.abs(got[late] - other[late]).max() < 0.1 * np.abs(got[late]).min()
 
 
 async def test_an_exact_burst_too_late_is_told_and_not_heard():

@@ -233,6 +233,8 @@ def test_a_robot_whose_radio_is_off_neither_hears_nor_is_heard(load):
         assert (world.hop(2, 1, t) is not None) == is_on
     with pytest.raises(ConfigError, match=r"robot.off of robot 1: got \[4, 3\]"):
         load(ONE + "off = [[4, 3]]\n" + TWO)
+    with pytest.raises(ConfigError, match=r"air.jammer.times: got \[4, 3\]"):
+        load("[[air.jammer]]\ntimes = [[4, 3]]\n" + ONE + TWO)
 
 
 def test_where_robots_relay_those_beyond_are_in_reach(load):

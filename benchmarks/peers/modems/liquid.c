@@ -4,6 +4,8 @@
  *   liquid headers SNR_DB FRAMES SEED                   frames whose header was read
  *   liquid speed CODE BITS BYTES                        Msps of CPU time: transmitter, receiver
  *   liquid noise SAMPLES SEED                           Msps of CPU time on noise, payloads told
+ *   liquid send CODE BITS BYTES SEED FILE               writes a frame's samples
+ *   liquid hear BYTES SEED FILE                         how many such frames are in samples
  *
  * SNR: mean power of the frame over that of the noise in the sample band. Every frame comes after
  * 200 to 599 samples of noise, its carrier off by up to 0.02 radians a sample either way.
@@ -147,6 +149,27 @@ static void measure_speed(const char *code, int bits)
     ofdmflexframegen_destroy(sends);
 }
 
+static void send_file(const char *code, int bits, const char *path)
+{
+    FILE *file = fopen(path, "wb");
+    ofdmflexframegen sends = sender(code, bits);
+    int n = frame(sends, wave);
+    if (!file || fwrite(wave, sizeof *wave, n, file) != (size_t)n || fclose(file)) exit(1);
+    ofdmflexframegen_destroy(sends);
+}
+
+static void hear_file(const char *path)
+{
+    FILE *file = fopen(path, "rb");
+    ofdmflexframesync hears = receiver();
+    if (!file) exit(1);
+    for (size_t n; (n = fread(wave, sizeof *wave, ROOM, file));)
+        ofdmflexframesync_execute(hears, wave, n);
+    fclose(file);
+    ofdmflexframesync_destroy(hears);
+    printf("%ld\n", right);
+}
+
 int main(int argc, char **argv)
 {
     if (argc == 8 && !strcmp(argv[1], "errors")) {
@@ -170,6 +193,14 @@ int main(int argc, char **argv)
         for (long i = 0; i < rounds; i++) ofdmflexframesync_execute(hears, wave, ROOM);
         printf("%g %ld\n", (double)rounds * ROOM / (cpu_s() - begin) * 1e-6, told);
         ofdmflexframesync_destroy(hears);
+    } else if (argc == 7 && !strcmp(argv[1], "send")) {
+        size = atoi(argv[4]), state = atoll(argv[5]);
+        refill();
+        send_file(argv[2], atoi(argv[3]), argv[6]);
+    } else if (argc == 5 && !strcmp(argv[1], "hear")) {
+        size = atoi(argv[2]), state = atoll(argv[3]);
+        refill();
+        hear_file(argv[4]);
     } else {
         return 2;
     }

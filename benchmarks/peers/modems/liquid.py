@@ -5,6 +5,9 @@ import shutil
 import tempfile
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from benchmarks.absent import PeerError
 from benchmarks.processes import told_by
 
@@ -35,6 +38,18 @@ class Liquid:
     def noise_msps(self, n_samples: int, seed: int) -> float:
         """Msps of CPU time of a receiver on noise alone."""
         return float(self._run("noise", n_samples, seed).split()[0])
+
+    def frame(self, code: str, bits: int, n_bytes: int, seed: int) -> NDArray[np.complex64]:
+        """The samples of a frame `[n]`; its payload is drawn from `seed`."""
+        file = self._program.with_name("frame")
+        self._run("send", code, bits, n_bytes, seed, file)
+        return np.fromfile(file, np.complex64)
+
+    def heard(self, n_bytes: int, seed: int, samples: NDArray[np.complex64]) -> int:
+        """How many frames with that payload are read in samples `[n]`."""
+        file = self._program.with_name("samples")
+        samples.tofile(file)
+        return int(self._run("hear", n_bytes, seed, file))
 
     def _run(self, *arguments: object) -> str:
         return told_by(self.name, self._program, *arguments)
