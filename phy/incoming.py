@@ -17,6 +17,7 @@ SLIP_EVERY = 256
 
 SEEMING = 5e-6
 """Squared turn in rad² that phase noise and clocks make still echoes seem to have in a symbol."""
+
 # When a PDU fails and the power above the noise is below this share of the burst's, the burst has
 # ended.
 _FADED = 0.25
