@@ -53,6 +53,8 @@ _SURELY_MOVES, _MOVES_ON = 4.0, 2.5
 _SPEED, _OLD = 2e-5, 1.5
 # A channel that will not move by as much in so many symbols stands still.
 _FAR = 24
+# Variance in rad² of the phase that is not taken for movement; in a fade, it has more.
+_MOST_JITTER = 1e-4
 # By this share of the noise, gains may become less certain from one correction to the next.
 _LITTLE = 0.125
 
@@ -296,7 +298,7 @@ def follow(
     # What is there where nothing was found, is noise that the preamble did not have.
     variance = max(variance, noise / n_noise)
     # Nor is it movement if the phase is wrong by which symbols were turned back.
-    jitter = channel.tracking[PHASE, 2]
+    jitter = min(channel.tracking[PHASE, 2], _MOST_JITTER)
     excess, chance, whole = 0.0, 0.0, 0.0
     for group in range(last):
         if power[group] > 0:

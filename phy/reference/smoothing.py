@@ -30,6 +30,8 @@ SPEED, OLD = 2e-5, 1.5
 is older than the last symbol that it is made of."""
 FAR = 24
 """A channel that will not move by as much in so many symbols stands still."""
+MOST_JITTER = 1e-4
+"""Variance in rad² of the phase that is not taken for movement; in a fade, it has more."""
 LITTLE = 0.125
 """By this share of the noise, gains may become less certain from one correction to the next."""
 
@@ -184,7 +186,8 @@ def follow(
     found[-1] = False
     variance = max(variance, float(e[-1] / np.sum(m[~found])))
     # Nor is it movement if the phase is wrong by which symbols were turned back.
-    expected = variance + phase.covariance[0] * power + channel.unknown[0]
+    jitter = min(phase.covariance[0], MOST_JITTER)
+    expected = variance + jitter * power + channel.unknown[0]
     excess = np.sum((e - m * expected)[found])
     chance = np.sqrt(np.sum((m * expected**2)[found]))
     whole, more = float(np.sum((m * power)[found])), 0.0
