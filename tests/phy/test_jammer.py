@@ -26,7 +26,7 @@ def sent(kind, n, index=0, **more):
 
 @every_kind
 def test_its_power_while_it_sends_is_as_told(kind):
-    x = sent(kind, 200_000)
+    x = sent(kind, 50_000)
     on = x[np.abs(x) > 0] if kind == "pulses" else x
     assert 10 * np.log10(np.mean(np.abs(on) ** 2)) == pytest.approx(-20, abs=0.4)
 
@@ -63,7 +63,7 @@ def spectrum(x):
     ("kind", "centre_hz", "width_hz"), [("tone", 2e5, 200), ("narrow", -1e5, 5.2e4)]
 )
 def test_its_power_is_where_it_is_told_to_be(kind, centre_hz, width_hz):
-    share, at_hz = spectrum(sent(kind, 50_000))
+    share, at_hz = spectrum(sent(kind, 30_000))
     assert share[np.abs(at_hz - centre_hz) <= width_hz / 2].sum() > 0.99
 
 
