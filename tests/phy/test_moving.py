@@ -116,7 +116,7 @@ class Followed:
 def test_a_channel_that_stands_still_again_is_believed_to():
     """Its drift falls by a factor of e in 80 symbols, and it is corrected every 8 symbols again."""
     due = []
-    for more in range(9):
+    for more in range(5):
         followed = Followed(seed=SEED + more)
         followed.hear(40)
         assert followed.channel.figures[DUE] == 8
