@@ -52,6 +52,7 @@ from backends.writing import Annotation, RecordingWriter
 if TYPE_CHECKING:
     from backends.air import Channel
     from backends.ether import (
+        SPEED_OF_LIGHT,
         AirParams,
         Answer,
         Antenna,
@@ -80,6 +81,7 @@ __all__ = [
     "GAP_LABEL",
     "SAMPLE_TYPES",
     "SENDING",
+    "SPEED_OF_LIGHT",
     "AbsentError",
     "AirParams",
     "Annotation",

@@ -52,7 +52,7 @@ def _rows(seed: int, quick: bool) -> Iterator[Row]:
             with attempt("liquid-dsp"):
                 # It finds no frame whose carrier is off by more than half a subcarrier.
                 air = Air(rate_hz, profile="tdl-a", doppler_hz=doppler_hz, ppm=_LIQUID_PPM)
-                row.peers["liquid-dsp g2412, equal clocks"] = _liquid_lost(air, n_bytes)
+                row.peers["liquid-dsp g2412, equal clocks"] = _liquid_lost(air, n_bytes, seed)
         yield row
     for step_db in (-3.0, -6.0):
         yield _step(step_db, seed, quick)
@@ -138,9 +138,9 @@ def _moving(
     return _lost(name, lost, target, "TDL-A 100 ns, 25 dB, QPSK 1/2, each burst whole", quick)
 
 
-def _liquid_lost(air: Air, n_bytes: int) -> float:
-    """The share of frames that liquid-dsp loses on the same channel, with QPSK and rate 1/2."""
-    liquid, heard, seed = Liquid(), 0, 1
+def _liquid_lost(air: Air, n_bytes: int, seed: int) -> float:
+    """The share of frames that liquid-dsp loses on such a channel, with QPSK and rate 1/2."""
+    liquid, heard = Liquid(), 0
     wave = liquid.frame("g2412", 2, n_bytes, seed)
     wave /= np.sqrt(np.mean(np.abs(wave) ** 2))
     stream = frames(air, wave, SNR_DB, seed)

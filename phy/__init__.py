@@ -24,15 +24,7 @@ from phy.quality import COUNTERS, BurstOver, BurstQuality, Claim, Event, PduHear
 from phy.sizes import N_PULSE, SENSE_WINDOW
 
 if TYPE_CHECKING:
-    from phy.channel import (
-        PROFILES,
-        FrontEnd,
-        FrontEndParams,
-        Jammer,
-        JammerParams,
-        Path,
-        PathParams,
-    )
+    from phy.channel import PROFILES, FrontEnd, FrontEndParams, Jammer, Path, PathParams
     from phy.engine import Engine, EngineError
     from phy.oversampling import REACH, Downsampler, upsample
     from phy.pulses import pulse
@@ -68,7 +60,6 @@ __all__ = [
     "FrontEnd",
     "FrontEndParams",
     "Jammer",
-    "JammerParams",
     "Mcs",
     "Modulation",
     "Numerology",
@@ -90,15 +81,7 @@ __all__ = [
 ]
 
 _LATER = {
-    "phy.channel": (
-        "PROFILES",
-        "FrontEnd",
-        "FrontEndParams",
-        "Jammer",
-        "JammerParams",
-        "Path",
-        "PathParams",
-    ),
+    "phy.channel": ("PROFILES", "FrontEnd", "FrontEndParams", "Jammer", "Path", "PathParams"),
     "phy.engine": ("Engine", "EngineError"),
     "phy.oversampling": ("REACH", "Downsampler", "upsample"),
     "phy.pulses": ("pulse",),

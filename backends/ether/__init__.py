@@ -11,6 +11,7 @@ from backends.ether.pace import hub_keeps_pace
 from backends.ether.protocol import Answer
 from backends.ether.watch import HubWatch
 from backends.ether.world import (
+    SPEED_OF_LIGHT,
     AirParams,
     Hop,
     JammerParams,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from backends.ether.radio import EtherRadio
 
 __all__ = [
+    "SPEED_OF_LIGHT",
     "AirParams",
     "Answer",
     "Antenna",

@@ -13,7 +13,6 @@ from backends.ether.medium import NOISE_DBFS
 from backends.ether.world import JammerParams, RadioParams
 from backends.outstanding import NEVER
 from phy import FrontEnd, FrontEndParams, Jammer
-from phy import JammerParams as Jamming
 
 NOTHING_DB = 300.0
 
@@ -37,7 +36,13 @@ class Antenna:
     ) -> None:
         self._radio = radio
         # All receive the same, so their waveforms have one seed.
-        self._jammers = [Jammer(_jammer(each), rate_hz, i) for i, each in enumerate(jammers)]
+        self._jammers = [
+            Jammer(
+                each.kind, NOISE_DBFS + each.over_noise_db, rate_hz, i, offset_hz=each.offset_hz,
+                width_hz=each.width_hz, period_s=each.period_s, duty=each.duty, times=each.times,
+            )
+            for i, each in enumerate(jammers)
+        ]  # fmt: skip
         self._index_error = 0 if radio.timestamps else round(radio.index_error_s * rate_hz)
         self._rng = np.random.Generator(np.random.SFC64(seed))
         front_end = FrontEndParams(
@@ -172,10 +177,3 @@ class Antenna:
         slip = max(slip, 1 - n)
         self._shift += slip
         return slip
-
-
-def _jammer(params: JammerParams) -> Jamming:
-    return Jamming(
-        params.kind, NOISE_DBFS + params.over_noise_db, params.offset_hz, params.width_hz,
-        params.period_s, params.duty, tuple((begin, end) for begin, end in params.times),
-    )  # fmt: skip

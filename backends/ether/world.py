@@ -26,7 +26,7 @@ class JammerParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Its mean power while it sends, over a receiver's noise in the band."""
     offset_hz: Annotated[float, Meta(ge=-1e8, le=1e8)] = 0.0
     width_hz: Annotated[float, Meta(ge=0, le=2e8)] = 0.0
-    """0: the whole band, for a sweep."""
+    """0: the whole band."""
     period_s: Annotated[float, Meta(gt=0, le=1e3)] = 0.01
     duty: Annotated[float, Meta(gt=0, le=1)] = 0.02
     times: list[Annotated[list[float], Meta(min_length=2, max_length=2)]] = []

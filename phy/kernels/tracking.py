@@ -24,7 +24,7 @@ DIFFER = 2.5
 STEP = 4.5
 """Number of standard deviations from which a difference in amplitude or phase is a step of it."""
 LEAST_STEP = 0.08
-"""A smaller step, relative or in radians, is left to the filters: clipped peaks make some."""
+"""A smaller step, relative or in radians, is left to the filters, which are there as soon."""
 CLEARLY = 0.03
 """Variance in rad² up to which pilots tell a step of phase: with more noise, angles mislead."""
 LAST = 0.3

@@ -550,7 +550,7 @@ class Link:
         name = self._topics[topic_id].name
         lines = self._why.explain(topic_id, name, told, now, self._air_use())
         report = self._reporter.reserved()
-        lines += self._scheduler.moves_words(now)
+        lines += self._scheduler.moves_words(self._intake.destination(topic_id), now)
         return [*lines, *reserved_words(self.own_id, octet(topic_id), report)]
 
     def report(self, now: float, names: Names = NO_NAMES) -> LinkReport:

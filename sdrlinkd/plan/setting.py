@@ -5,6 +5,7 @@ from random import Random
 
 import msgspec
 
+from backends import SPEED_OF_LIGHT
 from sdrlinkd.config import Config
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.link import PduLinkTraits, Settled, longest_burst_s, percent, settle
@@ -17,7 +18,6 @@ HOST_S = 0.01
 a machine with two cores that also runs other programs."""
 
 
-LIGHT_M_S = 299_792_458.0
 LAST_ID = 254
 MOST_ROBOTS = 32
 """Most robots of a plan."""
@@ -65,7 +65,7 @@ def setting_of(
     longest_s = radio.traits.longest_burst_s[modem.mcs]
     one_s = radio.airtimes.airtime_s(modem.mcs, 1)
     if speed_m_s:
-        doppler_hz = speed_m_s * modem.centre_hz / LIGHT_M_S
+        doppler_hz = speed_m_s * modem.centre_hz / SPEED_OF_LIGHT
         longest_s = max(one_s, min(longest_s, longest_burst_s(doppler_hz)))
         notes.append(_moving(speed_m_s, modem.centre_hz, doppler_hz, longest_s))
     bounds = access_bounds(settled, radio.traits, n, radio.longest_s, one_s)

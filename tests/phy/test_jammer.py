@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phy import Jammer, JammerParams
+from phy import Jammer
 from tests.laws import law
 
 RATE = 1e6
@@ -19,9 +19,12 @@ KINDS = {
 every_kind = pytest.mark.parametrize("kind", KINDS)
 
 
+def jammer_of(kind, **more):
+    return Jammer(kind, -20.0, RATE, 7, **{**KINDS[kind], **more})
+
+
 def sent(kind, n, index=0, **more):
-    params = JammerParams(kind, -20.0, **{**KINDS[kind], **more})
-    return Jammer(params, RATE, 7).add(np.zeros(n, np.complex64), index)
+    return jammer_of(kind, **more).add(np.zeros(n, np.complex64), index)
 
 
 @every_kind
@@ -35,19 +38,17 @@ def test_its_power_while_it_sends_is_as_told(kind):
 @law(20)
 @given(st.integers(0, 10**10), st.lists(st.integers(1, 3000), min_size=1, max_size=6))
 def test_any_chunks_of_the_same_stream_are_the_same(kind, index, lengths):
-    whole, params = sum(lengths), JammerParams(kind, -20.0, **KINDS[kind])
-    jammer, parts, at = Jammer(params, RATE, 7), [], index
+    jammer, parts, at = jammer_of(kind), [], index
     for n in lengths:
         parts.append(jammer.add(np.zeros(n, np.complex64), at))
         at += n
-    assert np.array_equal(np.concatenate(parts), sent(kind, whole, index))
+    assert np.array_equal(np.concatenate(parts), sent(kind, sum(lengths), index))
 
 
 @every_kind
 def test_it_sends_at_its_times_and_leaves_the_signal_as_it_is_at_others(kind):
     x = np.full(3000, 0.5 + 0.5j, np.complex64)
-    params = JammerParams(kind, -20.0, times=((0.001, 0.002),), **KINDS[kind])
-    y = Jammer(params, RATE, 7).add(x, 0)
+    y = jammer_of(kind, times=[(0.001, 0.002)]).add(x, 0)
     assert np.all(x == np.complex64(0.5 + 0.5j))
     changed = np.flatnonzero(y != x)
     assert 1000 <= changed[0] < changed[-1] < 2000

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import erfc
 
 from benchmarks.trials import Air, bursts, lost_of
 from phy import OFDM_64_16, Modulation, PduHeard, Receiver, Transmitter, points, reference
@@ -114,37 +115,47 @@ class Followed:
 
 
 def test_a_channel_that_stands_still_again_is_believed_to():
-    """Its drift falls by a factor of e in 80 symbols, and it is corrected every 8 symbols again."""
-    due = []
+    """Its drift falls by a factor of e in 80 symbols, and it is corrected every 8 symbols again.
+
+    A subcarrier that was decided a quadrant off in a null stays so until the next burst.
+    """
+    due, worse = [], []
     for more in range(5):
         followed = Followed(seed=SEED + more)
         followed.hear(40)
         assert followed.channel.figures[DUE] == 8
-        echo = 0.7 * followed.h * np.exp(0.3j * GRID.used)
+        echo = 0.4 * followed.h * np.exp(0.3j * GRID.used)
         rest = followed.h - echo
         for i in range(30):
-            followed.h = rest + echo * np.exp(0.15j * i)
+            followed.h = rest + echo * np.exp(0.02j * i)
             followed.hear(1)
         drift = followed.channel.figures[DRIFT]
         assert drift > 1e-6
         assert followed.channel.figures[DUE] < 8
         followed.hear(160)
         assert followed.channel.figures[DRIFT] < drift * np.exp(-1)
-        followed.hear(600)
+        followed.hear(550)
+        known = erfc(np.abs(followed.h[GRID.data_at]) / np.sqrt(2 * followed.no)) / 2
+        worse.append(np.mean(followed.hear(50)) - np.mean(known))
         due.append(followed.channel.figures[DUE])
     # What looks like movement by chance may make one begin again.
     assert np.median(due) == 8
+    assert np.median(worse) < 0.002
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.002, 0.004])
-def test_an_offset_that_is_left_is_a_phase_and_no_movement(turn):
-    """Gains that turned against the phase's filter for ever were corrected for ever."""
-    followed, moves = Followed(no=0.001, turn=turn), []
-    for _ in range(200):
-        followed.hear(1)
-        moves.append(followed.channel.figures[MOVES])
-    assert 0 in moves
-    assert followed.channel.tracking[PHASE, 1] == pytest.approx(turn, abs=1e-3)
+@pytest.mark.parametrize("turn", [0.0, 0.004])
+def test_a_channel_that_stands_still_is_seldom_taken_to_move(turn):
+    """Neither an offset that is left nor the phase filter's own jitter counts as movement."""
+    moves = []
+    for more in range(8):
+        followed = Followed(turn=turn, seed=SEED + more)
+        followed.hear(100)
+        for _ in range(100):
+            followed.hear(1)
+            moves.append(followed.channel.figures[MOVES])
+        if not moves[-1]:
+            assert followed.channel.tracking[PHASE, 1] == pytest.approx(turn, abs=2e-3)
+    assert np.mean(moves) < 0.45
 
 
 def test_a_burst_of_interference_is_over_with_its_last_symbol():

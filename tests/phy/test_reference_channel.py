@@ -232,10 +232,11 @@ def test_symbols_are_equalised_alike(grid, modulation, noise_share):
 @every_grid
 def test_symbols_that_lean_are_equalised_alike(grid):
     """Unlike the reference, the kernel lets the slope lag by 0.01 rad at the outer subcarriers."""
-    ours, other = equalised(grid, Modulation.QAM16, 3 * BLOCK, 0.3 / grid.n_fft, 1e-3)
+    # Not for so long that one of them finds the channel still, and the other does not yet.
+    ours, other = equalised(grid, Modulation.QAM16, 2 * BLOCK, 0.3 / grid.n_fft, 1e-3)
     assert abs(ours[2].figures[SLOPE_USED]) > 0
-    # What the slope lags behind, the gains learn; so they may lead by as much.
-    assert np.abs(ours[1] - other[1]).max() < 0.02 * np.abs(other[1]).max()
+    # What the slope lags behind, the gains learn.
+    assert np.abs(ours[1] - other[1]).max() < 0.015 * np.abs(other[1]).max()
 
 
 @every_grid

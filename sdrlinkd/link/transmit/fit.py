@@ -43,6 +43,14 @@ class Fit(NamedTuple):
     gap_s: float = 0.0
     """Time that stays free between two bursts."""
 
+    @property
+    def most_s(self) -> float:
+        """Length of the longest burst of several PDUs; 0 if all bursts have one."""
+        lengths = zip(self.longest_burst_s, self.pdu_burst_s, strict=False)
+        several = [longest for mcs, (longest, one) in enumerate(lengths)
+                   if longest > one and mcs in self.rate.usable]  # fmt: skip
+        return max(several, default=0.0)
+
     def message_s(self, mcs: int, n_pdus: int) -> float:
         """Airtime in s of a message of so many PDUs, which goes in bursts of its own."""
         each_s = max(0.0, self.pdu_burst_s[mcs] - self.overhead_s)

@@ -58,17 +58,11 @@ class Motion:
         known = self._channels.get(src)
         return None if known is None or now - known.at > STALE_S else sqrt(known.square)
 
-    def bounding(self, most_s: float, now: float) -> dict[int, float]:
-        """By robot, the Doppler in Hz that keeps bursts shorter than `most_s`."""
-        found = {src: self.doppler_hz(src, now) for src in self._channels}
-        return {
-            src: doppler_hz
-            for src, doppler_hz in found.items()
-            if doppler_hz is not None and longest_burst_s(doppler_hz) < most_s
-        }
+    def fastest(self, destinations: Collection[int], now: float) -> tuple[float, int]:
+        """(Doppler in Hz, robot) of the one of `destinations` whose channel changes the fastest."""
+        wanted = self._channels if BROADCAST in destinations else destinations
+        return max(((self.doppler_hz(src, now) or 0.0, src) for src in wanted), default=(0.0, 0))
 
     def longest_s(self, destinations: Collection[int], now: float) -> float:
         """The longest burst in s to `destinations`; to all: as the fastest of them allows."""
-        wanted = self._channels if BROADCAST in destinations else destinations
-        found = (self.doppler_hz(each, now) for each in wanted)
-        return longest_burst_s(max((each for each in found if each is not None), default=0.0))
+        return longest_burst_s(self.fastest(destinations, now)[0])

@@ -61,7 +61,7 @@ class NoRadio:
         """How fast the channel to robot `src` changes: unknown, as there is no radio."""
         return Moves()
 
-    def moves_words(self, now: float) -> list[str]:  # noqa: ARG002  # the same always
+    def moves_words(self, dst: int, now: float) -> list[str]:  # noqa: ARG002  # the same always
         """Nothing to say, as there is no radio."""
         return []
 

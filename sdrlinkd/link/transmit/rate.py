@@ -22,10 +22,9 @@ SWING_WEIGHT = 0.05
 """Weight of the newest burst in the swing of a neighbor's SNR."""
 STEADY_DB = 1.0
 """Swing in dB that estimates of a steady SNR have."""
-SPREADS = {Qos.URGENT: 6.0, Qos.LATENCY: 2.5, Qos.DEFAULT: 1.5, Qos.BULK: 1.5}
-"""Standard deviations of a fading SNR that are kept as a margin. On Rayleigh fading, 7 % of the
-bursts fall below that of bulk, 1 % below that of latency. Urgent messages are small and cannot wait
-to be repeated, so they get as much as there is."""
+SPREADS = {Qos.URGENT: 6.0, Qos.LATENCY: 2.5, Qos.DEFAULT: 1.5}
+"""Standard deviations of a fading SNR that are kept as a further margin; bulk is as default. Urgent
+messages are small, and cannot wait to be repeated, so they get as much as there is."""
 KEPT_CHANGES = 256
 
 

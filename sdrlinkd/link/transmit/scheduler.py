@@ -376,19 +376,21 @@ class BurstScheduler:
 
     def moves(self, src: int, now: float) -> Moves:
         """How fast the channel to robot `src` changes, and how that bounds bursts."""
-        bounding = self._motion.bounding(max(self._fit.longest_burst_s), now)
-        bound_s = longest_burst_s(bounding[src]) if src in bounding else None
-        return Moves(self._motion.doppler_hz(src, now), bound_s)
+        bound_s = self._motion.longest_s({src}, now)
+        is_bound = bound_s < self._fit.most_s
+        return Moves(self._motion.doppler_hz(src, now), bound_s if is_bound else None)
 
-    def moves_words(self, now: float) -> list[str]:
-        """Sentences on the bursts that are short because channels change."""
-        return [
-            f"bursts to robot {src} are at most {1e3 * longest_burst_s(doppler_hz):.2g} ms long: "
-            f"the channel to it changes at {doppler_hz:.2g} Hz, as on the move"
-            for src, doppler_hz in self._motion.bounding(
-                max(self._fit.longest_burst_s), now
-            ).items()
-        ]
+    def moves_words(self, dst: int, now: float) -> list[str]:
+        """A sentence on bursts to `dst`, if they are short because a channel changes."""
+        doppler_hz, src = self._motion.fastest({dst}, now)
+        bound_s = longest_burst_s(doppler_hz)
+        if bound_s >= self._fit.most_s:
+            return []
+        words = (
+            f"its bursts are at most {1e3 * bound_s:.2g} ms long: the channel to robot {src} "
+            f"changes at {doppler_hz:.2g} Hz, as on the move"
+        )
+        return [words]
 
     def report(self) -> TransmitReport:
         """The report on what was sent so far, and how."""
