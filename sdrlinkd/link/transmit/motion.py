@@ -44,6 +44,11 @@ class Motion:
     def __init__(self) -> None:
         self._channels: dict[int, _Channel] = {}
 
+    @property
+    def knows_some(self) -> bool:
+        """Whether any robot's Doppler was ever told."""
+        return bool(self._channels)
+
     def note(self, src: int, doppler_hz: float, at: float) -> None:
         """Note the Doppler in Hz of a burst of robot `src`."""
         square, known = doppler_hz * doppler_hz, self._channels.get(src)

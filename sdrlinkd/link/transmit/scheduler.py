@@ -512,7 +512,9 @@ class BurstScheduler:
             self.bytes_per_s = self._composer.k_single / (two_s - one_s)
         if further is not None:
             asked.add(further)
-        most_s = self._motion.longest_s(self._outbox.destinations(), slot.start)
+        most_s = inf
+        if self._motion.knows_some:
+            most_s = self._motion.longest_s(self._outbox.destinations(), slot.start)
         if made_by is not None:
             most_s = min(most_s, made_by(slot.start))
         most_s = min(longest_s, max(one_s, most_s))
