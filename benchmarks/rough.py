@@ -6,6 +6,7 @@ Bursts are impaired as `benchmarks.trials` says. A share of lost PDUs meets its 
 
 import sys
 from collections.abc import Iterator
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from benchmarks.absent import attempt
 from benchmarks.peers.modems import Liquid
 from benchmarks.report import Row, exactly, main
 from benchmarks.trials import LEAD_IN, Air, ErrorRate, bursts, frames, lost_of
-from phy import SENSE_WINDOW, EnergyDetector, PduHeard, Receiver, Transmitter
+from phy import SENSE_WINDOW, EnergyDetector, Excisor, Jammer, PduHeard, Receiver, Transmitter
 
 QPSK12, QAM64_34 = 1, 6
 SNR_DB = 25.0
@@ -28,6 +29,32 @@ _MOVING = (
     (1e6, 40.0, 5, 64, 0.01),
     (1e6, 40.0, 4, 220, 0.02),
 )
+
+
+class _Jammed(NamedTuple):
+    """A jammer, its power above the burst's, the bursts, and the largest share lost."""
+
+    name: str
+    kind: Literal["tone", "narrow", "sweep"]
+    power_db: float
+    n_tones: int
+    target: float
+    mcs: int = QPSK12
+    n_bytes: int = 64
+    snr_db: float = 15.0
+
+
+_JAMMED = (
+    _Jammed("cw_lost_0db", "tone", 0, 1, 0.005),
+    _Jammed("cw_lost_20db", "tone", 20, 1, 0.005),
+    _Jammed("cw_lost_40db", "tone", 40, 1, 0.005),
+    _Jammed("three_tones_lost_10db", "tone", 10, 3, 0.005),
+    _Jammed("narrow_lost_10db", "narrow", 10, 1, 0.005),
+    _Jammed("sweep_10ms_lost_10db", "sweep", 10, 1, 0.005),
+    _Jammed("cw_20db_64qam34_220B_25db", "tone", 20, 1, 0.015, QAM64_34, 220, 25.0),
+    _Jammed("three_tones_10db_64qam34_220B_25db", "tone", 10, 3, 0.05, QAM64_34, 220, 25.0),
+)
+_JAMMED_HZ, _SETTLED, _AT_ONCE = 1e6, 12_000, 10
 _LIQUID_FRAMES, _LIQUID_PPM = 300, 1.0
 _PATIENCE_S = 0.04
 """As the modem of a daemon has it."""
@@ -54,6 +81,10 @@ def _rows(seed: int, quick: bool) -> Iterator[Row]:
                 air = Air(rate_hz, profile="tdl-a", doppler_hz=doppler_hz, ppm=_LIQUID_PPM)
                 row.peers["liquid-dsp g2412, equal clocks"] = _liquid_lost(air, n_bytes, seed)
         yield row
+    for jammed in _JAMMED:
+        yield _beside(jammed, seed, quick)
+    yield _penalty(seed, quick)
+    yield _busy_beside_a_tone(seed)
     for step_db in (-3.0, -6.0):
         yield _step(step_db, seed, quick)
     yield _false_pdus(seed, 10**6 if quick else 10**8)
@@ -148,6 +179,67 @@ def _liquid_lost(air: Air, n_bytes: int, seed: int) -> float:
         parts = [x for _, x in zip(range(50), stream, strict=False)]
         heard += liquid.heard(n_bytes, seed, np.concatenate([*parts, parts[0][:LEAD_IN]]))
     return 1 - heard / _LIQUID_FRAMES
+
+
+def _beside(jammed: _Jammed, seed: int, quick: bool) -> Row:
+    """Bursts beside a jammer, which has another frequency for every ten of them."""
+    lost = _jammed_lost(jammed, seed, 300 if quick else 3000)
+    note = f"{jammed.n_bytes} B, MCS {jammed.mcs}, {jammed.snr_db:g} dB"
+    return _lost(jammed.name, lost, jammed.target, note, quick)
+
+
+def _jammed_lost(jammed: _Jammed, seed: int, n: int) -> ErrorRate:
+    rng, transmitter, errors = np.random.default_rng(seed), Transmitter(), 0
+    share_db = jammed.power_db - 10 * np.log10(jammed.n_tones)
+    for _ in range(n // _AT_ONCE):
+        pdus = [rng.bytes(jammed.n_bytes) for _ in range(_AT_ONCE)]
+        gaps = rng.integers(1200, 1800, _AT_ONCE)
+        parts = [
+            np.pad(transmitter.modulate([pdu], jammed.mcs), (gap, 0))
+            for pdu, gap in zip(pdus, gaps.tolist(), strict=True)
+        ]
+        x = np.pad(np.concatenate(parts), (_SETTLED, 3000))
+        x = x + _noise(rng, len(x), 10 ** (-jammed.snr_db / 10))
+        for _ in range(jammed.n_tones if jammed.power_db > -np.inf else 0):
+            offset_hz = 0.0 if jammed.kind == "sweep" else rng.uniform(-0.4, 0.4) * _JAMMED_HZ
+            width_hz = 3 / 64 * _JAMMED_HZ if jammed.kind == "narrow" else 0.0
+            x = Jammer(
+                jammed.kind, share_db, _JAMMED_HZ, int(rng.integers(1 << 30)),
+                offset_hz=offset_hz, width_hz=width_hz,
+            ).add(x, int(rng.integers(10_000)))  # fmt: skip
+        receiver, excisor = Receiver(), Excisor()
+        receiver.cuts = excisor.cuts
+        events = receiver.push(excisor.push(x)) + receiver.push(excisor.flush())
+        errors += len(set(pdus) - {each.data for each in events if isinstance(each, PduHeard)})
+    return ErrorRate(n, errors)
+
+
+def _penalty(seed: int, quick: bool) -> Row:
+    """How much SNR a tone of +20 dB costs at a PER of 1e-2."""
+    n, needed = 300 if quick else 3000, []
+    for power_db in (-np.inf, 20.0):
+        per: dict[float, float] = {}
+        for snr_db in np.arange(0.0, 3.1, 0.25).tolist():
+            jammed = _Jammed("", "tone", power_db, 1, 0.0, snr_db=snr_db)
+            per[snr_db] = max(_jammed_lost(jammed, seed, n).share, 0.1 / n)
+            if per[snr_db] < 0.01:
+                break
+        places, logs = list(per), np.log10(list(per.values()))
+        needed.append(float(np.interp(2.0, -logs[-2:], places[-2:])))
+    note = f"{needed[0]:.2f} dB without, {needed[1]:.2f} dB with; 64 B, QPSK 1/2"
+    return Row("cw_penalty_db", needed[1] - needed[0], "dB", 0.5, "less", n, note=note)
+
+
+def _busy_beside_a_tone(seed: int) -> Row:
+    """How much of the time a robot beside a tone takes the channel for busy, after 50 ms."""
+    rng, sense, excisor = np.random.default_rng(seed), EnergyDetector(), Excisor()
+    x = Jammer("tone", 20, _JAMMED_HZ, seed, offset_hz=1e5).add(_noise(rng, 2_000_000), 0)
+    busy = 0
+    for n, block in enumerate(np.split(x, 2000)):
+        sense.push(excisor.push(block))
+        busy += n >= 50 and sense.busy_until > sense.next_index - len(block)
+    note = "tone 20 dB above the noise's power, blocks of 1 ms"
+    return Row("cw_busy_share", busy / 1950, "share", 0.02, "less", 1950, note=note)
 
 
 def _step(step_db: float, seed: int, quick: bool) -> Row:

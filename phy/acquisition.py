@@ -86,6 +86,11 @@ class Acquisition:
         self._scratch = new_scratch(grid)
         self._room = _new_room(grid)
 
+    @property
+    def kept(self) -> NDArray[np.float32]:
+        """0 for subcarriers to leave out, by symbols of the header or payload `[n, width]`."""
+        return self._channel.content.kept
+
     def acquire(
         self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex
     ) -> Acquired | Missed:

@@ -6,11 +6,13 @@ if TYPE_CHECKING:
     from phy.kernels import acquire as acquire
     from phy.kernels import add_noise as add_noise
     from phy.kernels import convolve as convolve
+    from phy.kernels import cut_lines as cut_lines
     from phy.kernels import decode_blocks as decode_blocks
     from phy.kernels import decode_rows as decode_rows
     from phy.kernels import demodulate as demodulate
     from phy.kernels import encode_blocks as encode_blocks
     from phy.kernels import filter_strided as filter_strided
+    from phy.kernels import find_lines as find_lines
     from phy.kernels import interpolate as interpolate
     from phy.kernels import learn_channel as learn_channel
     from phy.kernels import list_decode as list_decode

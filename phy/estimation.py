@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from phy.constellation import Modulation
 from phy.numerology import Numerology
 from phy.sequences import POLARITY
-from phy.sizes import N_LANES, whole_lanes
+from phy.sizes import N_LANES, SLIP_EVERY, whole_lanes
 from phy.tables.block import ArgumentBlock
 from phy.tables.burst import N_FIGURES, Channel, Scratch, Tones
 
@@ -40,6 +40,7 @@ def new_channel(grid: Numerology) -> ArgumentBlock[Channel]:
             figures=np.zeros(N_FIGURES),
             tracking=np.zeros((2, 5)),
             missed=np.zeros((2, len(tones(grid).content.pilots))),
+            kept=np.ones((SLIP_EVERY, width), np.float32),
         )
     )
 

@@ -10,10 +10,8 @@ from phy.acquisition import Acquired
 from phy.estimation import tones
 from phy.layout import BurstLayout
 from phy.numerology import Numerology
+from phy.sizes import SLIP_EVERY
 from phy.tables.burst import N_FOLLOWED, SLOPE, TURNS
-
-SLIP_EVERY = 256
-"""Interval in payload symbols at which the FFT windows are aligned to the sender's clock."""
 
 SEEMING = 5e-6
 """Squared turn in rad² that phase noise and clocks make still echoes seem to have in a symbol."""

@@ -69,6 +69,8 @@ Event = PduHeard | BurstOver
 COUNTERS = (
     "samples",
     "samples_bad",
+    "windows_notched",
+    "windows_not_notched",
     "gaps",
     "triggers",
     "preambles",

@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 from phy import compute, preamble
 from phy.acquisition import Acquisition, Missed, before, needed_after
 from phy.constellation import Modulation
+from phy.cuts import Cuts
 from phy.demodulation import Demodulator, PduDecoder
 from phy.expected import Expected
 from phy.header import n_symbols
-from phy.incoming import SLIP_EVERY, IncomingBurst
+from phy.incoming import IncomingBurst
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
 from phy.quality import BurstOver, Claim, Event, PduHeard
 from phy.screening import Screening
+from phy.sizes import SLIP_EVERY
 from phy.states import Found, State, after
 from phy.stream import SampleStream
 from phy.tables.acquisition import BACKOFF
@@ -47,7 +49,8 @@ class Receiver:
     centre frequency in cycles per sample, if senders derive centre frequency and sample rate from
     one crystal: then the frequency offset also gives the error of the sampling clock. 0: unknown.
     `on_points` gets the equalised points `[n, n_data]` of payload symbols, for plots; it may be set
-    later, too. `expected` bounds what headers may claim; None believes all.
+    later, too. `expected` bounds what headers may claim; None believes all. `cuts` may be set to
+    what an excisor takes out of the samples.
     """
 
     def __init__(
@@ -65,6 +68,8 @@ class Receiver:
         self.on_points = on_points
         self._acquisition = Acquisition(grid, max_frequency, centre_cycles)
         self._demodulator = Demodulator(grid)
+        self.cuts: Cuts | None = None
+        self._n_marked = 0
         self._powers = np.empty(SLIP_EVERY, np.float32)
         self._decoder = PduDecoder()
         self._n_header = n_symbols(grid)
@@ -205,6 +210,9 @@ class Receiver:
         if self._stream.end < base + self._span:
             return False
         x = self._stream.view(base, base + self._span)
+        if self.cuts is not None:
+            known = np.arange(base + before(self._grid), base + self._span, self._grid.n_fft)
+            self._mark(self.cuts.kept(known, self._coarse, self._grid), self._n_header)
         found = self._acquisition.acquire(x, base, self._coarse, self._dc_value)
         self.counters["preambles"] += not isinstance(found, Missed) or found.stage != "preamble"
         if isinstance(found, Missed):
@@ -242,6 +250,9 @@ class Receiver:
         plan, found, first = burst.plan, burst.acquired, burst.n_symbols_in
         last, n_pdus = burst.complete(self._stream.end)
         begin, n = burst.window(first), last - first
+        if self.cuts is not None:
+            starts = begin + self._grid.n_symbol * np.arange(n)
+            self._mark(self.cuts.kept(starts, found.frequency, self._grid))
         points, on_points = None, self.on_points
         if on_points is not None:
             points = np.empty((n, self._grid.n_data), np.complex64)
@@ -288,6 +299,18 @@ class Receiver:
             burst.go_on()
             self._go(Found.PDUS)
         return True
+
+    def _mark(self, kept: NDArray[np.float32] | None, n_alike: int = 0) -> None:
+        """Tell the kernels which subcarriers to leave out of the next symbols.
+
+        `kept` has a row for each symbol, or what all of `n_alike` have in common.
+        """
+        rows = self._acquisition.kept
+        rows[: self._n_marked] = 1
+        self._n_marked = 0 if kept is None else n_alike or len(kept)
+        if kept is not None:
+            of_tones = kept[:, self._grid.tones]
+            rows[: self._n_marked, : self._grid.n_used] = of_tones.min(0) if n_alike else of_tones
 
     def _end(self, burst: IncomingBurst, events: list[Event], ending: str) -> None:
         self._burst = None

@@ -10,6 +10,8 @@ NOISE_CHUNK = 1024
 """Number of noise samples with one pair of keys; also the size of the working memory."""
 MAX_LLR = 511
 """Largest LLR that the Viterbi decoder takes."""
+SLIP_EVERY = 256
+"""Interval in payload symbols at which FFT windows are aligned to the sender's clock."""
 N_LANES = 8
 """Number of float32 that kernels compute with at once."""
 N_LANES_INT16 = 32

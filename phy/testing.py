@@ -24,6 +24,7 @@ from phy.segmentation import LIFTINGS, QuasiCyclic, Segmentation, least_coded, s
 from phy.sequences import polarity, whitening
 from phy.sizes import N_LANES, NOISE_CHUNK
 from phy.stream import SampleStream
+from phy.tables import notch as notch_tables
 from phy.tables.block import FIELDS, ArgumentBlock, block_of
 from phy.tables.burst import (
     DELAY,
@@ -51,6 +52,7 @@ from phy.tables.detector import (
     SURE,
     new_search_memory,
 )
+from phy.tables.notch import new_notch_memory
 from phy.transmitter import header_samples
 
 __all__ = [  # noqa: RUF022 (by stage)
@@ -89,7 +91,9 @@ __all__ = [  # noqa: RUF022 (by stage)
     "Acquisition",
     "Missed",
     "SampleStream",
+    "new_notch_memory",
     "new_search_memory",
+    "notch_tables",
     # What is known of a burst's channel.
     "DELAY",
     "DOUBT",

@@ -17,6 +17,7 @@ from phy.kernels.ldpc_encoder import encode_blocks
 from phy.kernels.list_viterbi import list_decode
 from phy.kernels.modulator import modulate, modulate_bits
 from phy.kernels.noise import add_noise
+from phy.kernels.notch import cut_lines, find_lines
 from phy.kernels.resampler import filter_strided, interpolate
 from phy.kernels.rotation import lean, lean_more
 from phy.kernels.sensing import sense
@@ -31,11 +32,13 @@ __all__ = [  # noqa: RUF022 (by use)
     "acquire",
     "add_noise",
     "convolve",
+    "cut_lines",
     "decode_blocks",
     "decode_rows",
     "demodulate",
     "encode_blocks",
     "filter_strided",
+    "find_lines",
     "interpolate",
     "learn_channel",
     "list_decode",

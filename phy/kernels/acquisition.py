@@ -190,6 +190,8 @@ def settle(
     error, n_header = 0.0, room.points.shape[0]
     for s in range(n_header):
         for d in range(tones.n_data):
+            if channel.kept[s, d] == 0:
+                continue
             x = complex(sent[N_LONG + s, 0, d], sent[N_LONG + s, 1, d])
             off = complex(room.points[s, d]) - 1 / x.conjugate()
             error += off.real * off.real + off.imag * off.imag

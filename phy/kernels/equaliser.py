@@ -105,7 +105,7 @@ def renew(channel: Channel) -> None:
 
 @step
 def _pilots(
-    re: Row, im: Row, polarity: float, tones: Tones, channel: Channel, scratch: Scratch
+    re: Row, im: Row, kept: Row, polarity: float, tones: Tones, channel: Channel, scratch: Scratch
 ) -> tuple[float, float]:
     """Track a symbol's phase, slope and amplitude by its pilots; returns (noise, amplitude)."""
     tracking, turned, power = channel.tracking, scratch.turned, scratch.pilot_power
@@ -119,6 +119,8 @@ def _pilots(
         turn *= complex(1.0, behind * tones.subcarriers[at]) * (back * tones.pilots[p])
         turned[p] = complex(re[at], im[at]) * h.conjugate() * turn
         power[p] = h.real * h.real + h.imag * h.imag
+        if kept[at] == 0:
+            turned[p], power[p] = 0j, 0.0
     subcarriers = tones.subcarriers[tones.n_data :]
     no, movement, amplitude, differ = correct(
         turned, power, subcarriers, _noise(channel), channel.figures, channel.missed, tracking
@@ -135,7 +137,7 @@ def _pilots(
 
 @step
 def _data(
-    re: Row, im: Row, c: float, s: float, trust: float, belief: float, axes: Axes,
+    re: Row, im: Row, kept: Row, c: float, s: float, trust: float, belief: float, axes: Axes,
     channel: Channel, scratch: Scratch, n: int,
 ) -> tuple[float, float]:  # fmt: skip
     """Convert a symbol's `n` data subcarriers to levels, and to LLRs plane by plane.
@@ -164,7 +166,9 @@ def _data(
         level_re, level_im = a * by_re - b * by_im, a * by_im + b * by_re
         store(level, d, level_re)
         store(level, width + d, level_im)
-        sure = load(certainty, d) * believed
+        keep = load(kept, d)
+        known = load(certainty, d) * keep
+        sure = known * believed
         axis_llrs(level_re, sure, real_bits, llr, d, n)
         mean_re, square = expected_level(llr, real_bits, d, n)
         mean_im: Lanes = splat(0)
@@ -174,21 +178,21 @@ def _data(
             square = square + square_im
         store(sums, d, load(sums, d) + (a * mean_re + b * mean_im) * by)
         store(sums, width + d, load(sums, width + d) + (b * mean_re - a * mean_im) * by)
-        store(masses, d, load(masses, d) + square * sureness)
+        store(masses, d, load(masses, d) + square * sureness * keep)
         mean = mean_re * mean_re + mean_im * mean_im
         certain = certain + mean
-        wrong = wrong + load(certainty, d) * (square - mean)
+        wrong = wrong + known * (square - mean)
     size = unit * unit * trust
     return float(total(certain)) * size, float(total(wrong)) * size
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _off(
-    re: Row, im: Row, c: float, s: float, belief: float, axes: Axes, channel: Channel,
+    re: Row, im: Row, kept: Row, c: float, s: float, belief: float, axes: Axes, channel: Channel,
     scratch: Scratch, n: int,
 ) -> float:  # fmt: skip
     """How far a symbol's points are from those decided, as a share of the noise; see `_data`."""
-    _data(re, im, c, s, 0.0, belief, axes, channel, scratch, n)
+    _data(re, im, kept, c, s, 0.0, belief, axes, channel, scratch, n)
     level, llr, certainty, width = scratch.level, scratch.llr, channel.certainty, re.size
     real_bits, imag_bits, unit = axes.real_bits, axes.imag_bits, axes.unit
     off: Lanes = splat(0)
@@ -198,13 +202,13 @@ def _off(
         if imag_bits:
             mean_im, _ = expected_level(llr, imag_bits, real_bits * n + d, n)
         off_re, off_im = load(level, d) - mean_re, load(level, width + d) - mean_im
-        off = off + load(certainty, d) * (off_re * off_re + off_im * off_im)
+        off = off + load(certainty, d) * load(kept, d) * (off_re * off_re + off_im * off_im)
     return float(total(off)) * unit * unit / (LLR_SCALE * n)
 
 
 @step
 def _learn_pilots(
-    re: Row, im: Row, turned_by: complex, trust: float, polarity: float, tones: Tones,
+    re: Row, im: Row, kept: Row, turned_by: complex, trust: float, polarity: float, tones: Tones,
     channel: Channel,
 ) -> None:  # fmt: skip
     """Add the pilots' evidence about their subcarriers' gains to the channel's sums and masses."""
@@ -212,10 +216,10 @@ def _learn_pilots(
         at = tones.n_data + p
         turn = complex(channel.turns[0, at], channel.turns[1, at])
         z = complex(re[at], im[at]) * turned_by * turn
-        sign = tones.pilots[p] * polarity * trust
+        sign = tones.pilots[p] * polarity * trust * kept[at]
         channel.sums[0, at] += z.real * sign
         channel.sums[1, at] += z.imag * sign
-        channel.masses[at] += trust
+        channel.masses[at] += trust * kept[at]
 
 
 @step
@@ -258,7 +262,8 @@ def equalise(
 
     `y` `[≥ n, 2, width]` has real and imaginary parts, in the order of tones. Its first symbol is
     number `number`; the header's first symbol is 0. `channel` carries over from call to call.
-    `points` `[…, n_data]` gets the equalised points if it has any rows.
+    `points` `[…, n_data]` gets the equalised points if it has any rows. The rows of
+    `channel.kept` are those of `llr`, and repeat.
     """
     n_data, n_bits, unit = tones.n_data, axes.gather.size, axes.unit
     gather, planes, figures = axes.gather, scratch.planes, channel.figures
@@ -270,7 +275,8 @@ def equalise(
         if figures[MOVES] > 0:
             move_on(tones, channel)
             renew(channel)
-        no, amplitude = _pilots(re, im, polarity, tones, channel, scratch)
+        kept = channel.kept[(first + row) % channel.kept.shape[0]]
+        no, amplitude = _pilots(re, im, kept, polarity, tones, channel, scratch)
         if abs(channel.tracking[SLOPE, 0] - figures[SLOPE_USED]) > most_lag:
             use_slope(channel.tracking[SLOPE, 0], tones, channel)
         # A symbol with more noise than the preamble, as under interference, counts less.
@@ -279,11 +285,11 @@ def equalise(
         c, s = math.cos(phase), -math.sin(phase)
         if amplitude != 1.0:
             # Pilots of another burst may look like a step of gain; its data do not.
-            off = _off(re, im, c, s, belief, axes, channel, scratch, n_data)
+            off = _off(re, im, kept, c, s, belief, axes, channel, scratch, n_data)
             if off > NO_STEP:
                 no = off * _noise(channel)
                 trust, belief = 1 / off, _noise(channel) / (no + figures[DOUBT])
-        certain, wrong = _data(re, im, c, s, trust, belief, axes, channel, scratch, n_data)
+        certain, wrong = _data(re, im, kept, c, s, trust, belief, axes, channel, scratch, n_data)
         if points.shape[0]:
             for d in range(n_data):
                 re_level, im_level = scratch.level[0, d], scratch.level[1, d]
@@ -293,7 +299,7 @@ def equalise(
         at = (first + row) * n_bits
         for k in range(n_bits):
             llr[at + k] = planes[gather[k]]
-        _learn_pilots(re, im, complex(c, s), trust, polarity, tones, channel)
+        _learn_pilots(re, im, kept, complex(c, s), trust, polarity, tones, channel)
         figures[CERTAIN] += certain + n_pilots * trust
         figures[WRONG] += wrong * _noise(channel) / LLR_SCALE
         figures[N_HEARD] += 1

@@ -6,6 +6,7 @@ from phy.tables.burst import Axes, Channel, Scratch, Tones
 from phy.tables.code import Form, Workspace
 from phy.tables.detector import SearchMemory
 from phy.tables.mapping import Map
+from phy.tables.notch import NotchMemory
 
 open_tones = opener(Tones)
 open_axes = opener(Axes)
@@ -17,3 +18,4 @@ open_form = opener(Form)
 open_workspace = opener(Workspace)
 open_map = opener(Map)
 open_search = opener(SearchMemory)
+open_notch = opener(NotchMemory)

@@ -17,6 +17,8 @@ from phy.tables.burst import GAIN, NO, SCALED, Channel, Planes, Row, Scratch, To
 # Number of standard deviations from which a difference in strength is not chance.
 _SURELY = 4.0
 _LARGEST_BOOST = 3.0
+# Steps in which the gains of subcarriers that were cut are found.
+_FILLS = 8
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -94,7 +96,8 @@ def estimate(
     scratch: Scratch,
 ) -> None:
     """Estimate the channel from known symbols by `least_squares`, without the probable noise."""
-    n_used = tones.bins.size
+    n_cut = _leave_out(y, sent.shape[0], tones, channel)
+    n_used = tones.bins.size - n_cut
     noise, power = least_squares(y, amplitude, sent, channel.h)
     no, power = max(noise / n_used, 1e-20), power / n_used
     mass = 0.0
@@ -103,8 +106,38 @@ def estimate(
     channel.figures[NO] = no
     # Measured gains include noise. If they contain nothing else, the difference may be negative.
     channel.figures[GAIN] = max(power - no / mass, 1e-3 * power, 1e-20)
+    if n_cut:
+        _fill(no / mass, tones, channel, scratch)
     smooth(no / mass, tones, channel, scratch)
     start(tones, channel)
+
+
+@step
+def _leave_out(y: NDArray[np.float32], n: int, tones: Tones, channel: Channel) -> int:
+    """Set tones of the `n` known symbols to 0 that were cut; returns their number."""
+    n_cut = 0
+    for k in range(tones.bins.size):
+        if channel.kept[0, k] == 0:
+            n_cut += 1
+            for s in range(n):
+                y[s, 0, k] = y[s, 1, k] = 0
+    return n_cut
+
+
+@step
+def _fill(variance: float, tones: Tones, channel: Channel, scratch: Scratch) -> None:
+    """Give the tones that were cut the gains that the smoother expects from all others.
+
+    Each step of expectation maximisation puts what was expected in the place of what is missing.
+    """
+    measured = local(np.float32, channel.h.shape)
+    for k in range(measured.shape[1]):
+        measured[0, k], measured[1, k] = channel.h[0, k], channel.h[1, k]
+    for _ in range(_FILLS):
+        smooth(variance, tones, channel, scratch)
+        for k in range(tones.bins.size):
+            if channel.kept[0, k] != 0:
+                channel.h[0, k], channel.h[1, k] = measured[0, k], measured[1, k]
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -135,7 +168,8 @@ def learn(
             at = 2 * width * s + k
             store(y, at, a)
             store(y, at + width, b)
-            h_re, h_im = load(channel.h, k), load(channel.h, width + k)
+            keep = load(channel.kept[0], k)
+            h_re, h_im = load(channel.h, k) * keep, load(channel.h, width + k) * keep
             seen = seen + (a * (h_re * c - h_im * d) + b * (h_re * d + h_im * c))
             expected = expected + (h_re * h_re + h_im * h_im)
     amplitude = local(np.float32, n)

@@ -70,14 +70,20 @@ class Acquisition:
         self._long = np.tile(preamble.long_subcarriers(grid), (preamble.N_LONG, 1)).astype(complex)
 
     def acquire(
-        self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex
+        self,
+        x: NDArray[np.complex64],
+        base: int,
+        coarse: float,
+        dc: complex,
+        kept: NDArray[np.float32] | None = None,
     ) -> Acquired | Missed:
         """Decode the header of the burst whose first long symbol is nominally at `x[before(grid)]`.
 
         `base` is the absolute index of `x[0]`, `coarse` the frequency of the peak, modulo 1/16
-        cycles per sample.
+        cycles per sample. Subcarriers with 0 in `kept` `[n_used]` were cut.
         """
         grid = self._grid
+        whole = np.ones(grid.n_used, np.float32) if kept is None else kept
         # 2. Timing and offset.
         first = before(grid) - SEARCH
         found = locate(turned_back(x[first:], dc, coarse), self._templates)
@@ -89,44 +95,46 @@ class Acquisition:
         burst = x[begin:]
         # 3. Channel, 4. offset again, and with it the channel.
         y = to_subcarriers(burst, self._windows, frequency, dc, grid)
-        channel = self._of_training(y)
+        channel = self._of_training(y, whole)
         frequency += refine(turned_back(burst, dc, frequency), channel.h, grid)
         y = to_subcarriers(burst, self._windows, frequency, dc, grid)
-        channel = self._of_training(y)
+        channel = self._of_training(y, whole)
         # 5. Header.
         clock_error = frequency / self._centre_cycles if self._centre_cycles else None
         equaliser = Equaliser(grid, channel, Tracking(grid, channel, clock_error))
-        llr, points = self._read(y[preamble.N_LONG :], equaliser)
+        llr, points = self._read(y[preamble.N_LONG :], equaliser, whole)
         header = parse_header(folded(llr))
         if header is None:
             return Missed("header")
         sent = header_subcarriers(header, grid)
-        self._learn(y, sent, equaliser)
+        self._learn(y, sent, equaliser, whole)
         training = burst[self._windows[0] :][: preamble.N_LONG * grid.n_fft]
         quality = BurstQuality(
             base + begin + BACKOFF,
             *header,
             snr_db=_snr_db(equaliser.channel, grid),
             rssi_dbfs=decibel(float(np.mean(np.abs(training - dc) ** 2))),
-            evm_db=decibel(float(np.mean(np.abs(points - sent[:, grid.data_at]) ** 2))),
+            evm_db=_evm_db(points, sent[:, grid.data_at], whole[grid.data_at]),
             cfo=frequency,
         )
         origin = base + begin
         window = origin + int(self._windows[-1]) + grid.n_symbol
         return Acquired(header, quality, origin, window, frequency, equaliser)
 
-    def _of_training(self, y: Subcarriers) -> Channel:
+    def _of_training(self, y: Subcarriers, kept: NDArray[np.float32]) -> Channel:
         """Estimate the channel from both long symbols."""
         n = preamble.N_LONG
-        return estimate(y[:n], self._long, np.ones(n), self._grid)
+        return estimate(y[:n], self._long, np.ones(n), self._grid, kept)
 
     def _read(
-        self, y: Subcarriers, equaliser: Equaliser
+        self, y: Subcarriers, equaliser: Equaliser, kept: NDArray[np.float32]
     ) -> tuple[NDArray[np.int16], NDArray[np.complex128]]:
         """Convert header symbols `[n, n_used]` to (LLRs `[n · n_data]`, points `[n, n_data]`)."""
-        return equaliser.equalise(y, 0, Modulation.BPSK)
+        return equaliser.equalise(y, 0, Modulation.BPSK, np.tile(kept, (len(y), 1)))
 
-    def _learn(self, y: Subcarriers, sent: Subcarriers, equaliser: Equaliser) -> None:
+    def _learn(
+        self, y: Subcarriers, sent: Subcarriers, equaliser: Equaliser, kept: NDArray[np.float32]
+    ) -> None:
         """Refine the channel with the decoded header: four symbols instead of two.
 
         The header's symbols have turned by the tracked phase, minus the rate for each later symbol.
@@ -136,7 +144,7 @@ class Acquisition:
         rotation = np.asarray(tracked.value - tracked.rate * later, np.float64)
         known = np.concatenate((self._long, sent))
         equaliser.channel = learn(
-            y, known, preamble.N_LONG, rotation, equaliser.channel, self._grid
+            y, known, preamble.N_LONG, rotation, equaliser.channel, self._grid, kept
         )
 
 
@@ -150,6 +158,11 @@ def header_subcarriers(header: BurstHeader, grid: Numerology) -> Subcarriers:
 def _snr_db(channel: Channel, grid: Numerology) -> float:
     """The SNR in dB; noise counts in all 64 subcarriers, the signal in 52."""
     return decibel(channel.gain / channel.no * grid.n_used / grid.n_fft)
+
+
+def _evm_db(points: Subcarriers, sent: Subcarriers, kept: NDArray[np.float32]) -> float:
+    """The error of points `[n, n_data]` in dB, without what was cut."""
+    return decibel(float(np.sum(kept * np.abs(points - sent) ** 2) / points.size))
 
 
 def decibel(ratio: float) -> float:

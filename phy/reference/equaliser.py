@@ -25,6 +25,7 @@ class Tracked(NamedTuple):
     """A symbol whose pilots were looked at."""
 
     y: Subcarriers
+    kept: NDArray[np.float32]
     no: float
     angle: NDArray[np.float64]
     sign: float
@@ -49,7 +50,11 @@ class Equaliser:
         self._forget_block()
 
     def equalise(
-        self, y: Subcarriers, number: int, modulation: Modulation
+        self,
+        y: Subcarriers,
+        number: int,
+        modulation: Modulation,
+        kept: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.int16], Subcarriers]:
         """Convert symbols `[n, n_used]` to LLRs in the order of the code, and points.
 
@@ -57,23 +62,27 @@ class Equaliser:
 
         N' is the noise and the mean variance of Ĥ. LLRs `[n · n_data · bits]` are in eighths,
         positive for 0; the equalised points are `[n, n_data]`. The header's first symbol has number
-        0; the first one here has `number`, and symbols are consecutive.
+        0; the first one here has `number`, and symbols are consecutive. Subcarriers with 0 in
+        `kept` `[n, n_used]` tell nothing.
         """
+        whole = np.ones(y.shape, np.float32) if kept is None else kept
         waiting: list[Tracked] = []
         parts = []
-        for each, sign in zip(y, polarity(len(y), number).tolist(), strict=True):
+        signs = polarity(len(y), number).tolist()
+        for each, row, sign in zip(y, whole, signs, strict=True):
             if self.channel.moves:
                 # The channel moves, so each symbol has its own.
                 parts += self._equalise(waiting, modulation)
                 self._move_on()
             self.tracking.predict()
-            shown = self.tracking.correct(each[self._grid.pilots_at], sign, self.channel)
+            at = self._grid.pilots_at
+            shown = self.tracking.correct(each[at], sign, self.channel, row[at])
             if shown.movement > 0 or shown.amplitude != 1:
                 parts += self._equalise(waiting, modulation)
                 self._believe(shown)
             if shown.differ or shown.movement > 0:
                 self.channel.due = 1
-            tracked = Tracked(each, shown.no, self.tracking.angle, sign)
+            tracked = Tracked(each, row, shown.no, self.tracking.angle, sign)
             if shown.amplitude != 1:
                 tracked = self._examined(tracked, modulation)
             waiting.append(tracked)
@@ -101,9 +110,10 @@ class Equaliser:
         channel = self.channel
         h = channel.h[self._grid.data_at]
         u = (symbol.y * np.exp(-1j * symbol.angle))[self._grid.data_at] / h
-        certainty = np.abs(h) ** 2 / (symbol.no + channel.doubt)
+        kept = symbol.kept[self._grid.data_at]
+        certainty = kept * np.abs(h) ** 2 / (symbol.no + channel.doubt)
         _, decided = demap(u[None], certainty[None], modulation)
-        off = np.abs(h) ** 2 * np.abs(u - decided.mean[0]) ** 2
+        off = kept * np.abs(h) ** 2 * np.abs(u - decided.mean[0]) ** 2
         share = float(np.mean(off)) / channel.noise
         return symbol._replace(no=share * channel.noise) if share > NO_STEP else symbol
 
@@ -114,14 +124,15 @@ class Equaliser:
         if not waiting:
             return []
         grid, channel = self._grid, self.channel
-        y, no, angle, signs = (np.array(each) for each in zip(*waiting, strict=True))
+        y, kept, no, angle, signs = (np.array(each) for each in zip(*waiting, strict=True))
         waiting.clear()
         turned = y * np.exp(-1j * angle)
         h = channel.h[grid.data_at]
         power = np.abs(h) ** 2
         u = turned[:, grid.data_at] * (h.conj() / (power + 1e-30))
-        llr, decided = demap(u, power / (no + channel.doubt)[:, None], modulation)
-        self._learn(turned, decided, signs, channel.noise / no)
+        certainty = kept[:, grid.data_at] * power / (no + channel.doubt)[:, None]
+        llr, decided = demap(u, certainty, modulation)
+        self._learn(turned, decided, signs, kept * (channel.noise / no)[:, None])
         return [(deinterleaved(llr, modulation, grid), u)]
 
     def _learn(
@@ -133,17 +144,18 @@ class Equaliser:
     ) -> None:
         """Add symbols to the sums: Σ Y (E s)*, Σ E|s|², Σ|E s|², Σ|Ĥ|² (E|s|² − |E s|²).
 
-        Pilots are certain. A symbol with interference counts less: `trust` is N over its own noise.
+        Pilots are certain. A symbol with interference counts less: `trust` `[n, n_used]` is N over
+        its own noise, and 0 for subcarriers that were cut.
         """
         grid = self._grid
         mean, square = np.empty(turned.shape, np.complex128), np.empty(turned.shape)
         mean[:, grid.data_at], square[:, grid.data_at] = decided
         mean[:, grid.pilots_at] = signs[:, None] * grid.pilot_values
         square[:, grid.pilots_at] = 1.0
-        matched = trust[:, None] * (turned * mean.conj())
-        certain = trust * np.sum(np.abs(mean) ** 2, axis=1)
+        matched = trust * (turned * mean.conj())
+        certain = np.sum(trust * np.abs(mean) ** 2, axis=1)
         power = np.abs(self.channel.h) ** 2
-        wrong = trust * np.sum(power * (square - np.abs(mean) ** 2), axis=1)
+        wrong = np.sum(trust * power * (square - np.abs(mean) ** 2), axis=1)
         # One after another, so that it does not matter how many come at once.
         for i in range(len(turned)):
             self._sums += matched[i]

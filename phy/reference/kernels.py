@@ -9,6 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from phy.reference.notch import cut_lines, find_lines
 from phy.sizes import NOISE_CHUNK, SENSE_WINDOW
 from phy.tables.sensing import (
     APART,
@@ -162,9 +163,19 @@ def _end_run(length: float, state: NDArray[np.float64]) -> None:
         state[N_SHORT] += 1
 
 
-KERNELS: dict[str, Callable[..., None]] = {
+def sanitise(x: NDArray[np.complex64], limit: float) -> int:
+    """Set samples that are not finite or exceed `limit` to 0; returns their number."""
+    good = (np.abs(x.real) < limit) & (np.abs(x.imag) < limit)
+    x[~good] = 0
+    return int(len(x) - good.sum())
+
+
+KERNELS: dict[str, Callable[..., int | None]] = {
     "add_noise": add_noise,
     "filter_strided": filter_strided,
+    "cut_lines": cut_lines,
+    "find_lines": find_lines,
     "interpolate": interpolate,
+    "sanitise": sanitise,
     "sense": sense,
 }

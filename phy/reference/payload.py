@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy.crc import checked
+from phy.cuts import Cuts
 from phy.layout import BurstLayout
 from phy.numerology import Numerology
 from phy.reference.acquisition import Acquired
@@ -59,14 +60,21 @@ class Payload:
         limit = first - first % SLIP_EVERY + SLIP_EVERY
         return min(arrived, plan.symbols_through(self.n_done + 1), limit) - first
 
-    def take(self, samples: NDArray[np.complex64], dc: complex, n: int) -> Subcarriers:
+    def take(
+        self, samples: NDArray[np.complex64], dc: complex, n: int, cuts: Cuts | None = None
+    ) -> Subcarriers:
         """Process the next `n` symbols, from the first FFT window on; returns their points."""
         found, grid, first = self.acquired, self._grid, self.n_symbols_in
         origin = self.window(first) - found.origin
         starts = grid.n_symbol * np.arange(n)
         y = to_subcarriers(samples, starts, found.frequency, dc, grid, origin)
         self._powers += np.mean(np.abs(y) ** 2, axis=1).tolist()
-        llr, points = found.equaliser.equalise(y, self._n_header + first, self.plan.mcs.modulation)
+        kept = None
+        if cuts is not None:
+            kept = cuts.kept(self.window(first) + starts, found.frequency, grid)
+        llr, points = found.equaliser.equalise(
+            y, self._n_header + first, self.plan.mcs.modulation, kept
+        )
         self._llr = np.concatenate((self._llr, llr))
         self.n_symbols_in += n
         return points

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from phy import preamble
 from phy.constellation import Modulation
+from phy.cuts import Cuts
 from phy.expected import Expected
 from phy.header import n_symbols
 from phy.layout import layout
@@ -74,6 +75,7 @@ class Receiver:
         self._peak: tuple[int, float] | None = None
         self.claim = Claim(start, start)
         """The air that the last header claims."""
+        self.cuts: Cuts | None = None
         self.counters: Counter[str] = Counter()
         self._begin(start)
 
@@ -191,7 +193,12 @@ class Receiver:
         x = self._view(base, base + self._span)
         if x is None:
             return False
-        found = self._acquisition.acquire(x, base, coarse, self._detector.dc)
+        kept = None
+        if self.cuts is not None:
+            starts = np.arange(base + before(self._grid), base + self._span, self._grid.n_fft)
+            of_each = self.cuts.kept(starts, coarse, self._grid)
+            kept = None if of_each is None else of_each.min(0)
+        found = self._acquisition.acquire(x, base, coarse, self._detector.dc, kept)
         self._peak = None
         self.counters["preambles"] += not isinstance(found, Missed) or found.stage != "preamble"
         if isinstance(found, Missed):
@@ -232,7 +239,7 @@ class Receiver:
         x = self._view(burst.window(first), burst.end_of(last))
         if x is None:
             return False
-        points = burst.take(x, self._detector.dc, n)
+        points = burst.take(x, self._detector.dc, n, self.cuts)
         if self._on_points is not None:
             self._on_points(points.astype(np.complex64), burst.plan.mcs.modulation)
         self._at = burst.end_of(last)

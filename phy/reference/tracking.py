@@ -121,13 +121,17 @@ class Tracking:
         """The phase of each subcarrier in use `[n_used]`: φ + sk."""
         return np.asarray(self.phase.value + self.slope.value * self._grid.used, np.float64)
 
-    def correct(self, pilots: Subcarriers, polarity: float, channel: Channel) -> Shown:
+    def correct(
+        self, pilots: Subcarriers, polarity: float, channel: Channel, kept: NDArray[np.float32]
+    ) -> Shown:
         """Correct φ and s by a symbol's pilots `[n_pilots]`; returns what else they show.
+
+        A pilot with 0 in `kept` has no weight.
 
         θ_p = arg(Y_p Ĥ*_p P_p) − φ − s k_p;  S_i = Σ|Ĥ_p|² k_p^i
         Var(φ) = N/2 · S₂ / (S₀S₂ − S₁²),  Var(s) = N/2 · S₀ / (S₀S₂ − S₁²)
         """
-        k, h = self._k, channel.h[self._grid.pilots_at]
+        k, h = self._k, channel.h[self._grid.pilots_at] * kept
         back = np.exp(-1j * (self.phase.value + self.slope.value * k))
         turned = pilots * h.conj() * (polarity * self._pilots) * back
         return self.correct_by(turned, np.abs(h) ** 2, k, channel)

@@ -13,6 +13,10 @@ SURELY = 4.0
 LARGEST_BOOST = 3.0
 
 
+FILLS = 8
+"""Steps in which the gains of subcarriers that were cut are found."""
+
+
 def least_squares(
     y: Subcarriers, sent: Subcarriers, amplitude: NDArray[np.float64]
 ) -> tuple[Subcarriers, float]:
@@ -29,23 +33,31 @@ def least_squares(
 
 
 def estimate(
-    y: Subcarriers, sent: Subcarriers, amplitude: NDArray[np.float64], grid: Numerology
-) -> Channel:
+    y: Subcarriers, sent: Subcarriers, amplitude: NDArray[np.float64], grid: Numerology,
+    kept: NDArray[np.float32] | None = None,
+) -> Channel:  # fmt: skip
     """Estimate the channel from known symbols by least squares, without the probable noise.
 
-    The noise of a gain is v = N / Σ_s a_s².
+    The noise of a gain is v = N / Σ_s a_s². Subcarriers with 0 in `kept` `[n_used]` are not known:
+    they get the gains that the smoother expects, again and again (expectation maximisation).
     """
-    h, no = least_squares(y, sent, amplitude)
-    no = max(no, 1e-20)
-    power, v = float(np.mean(np.abs(h) ** 2)), no / float(np.sum(amplitude**2))
+    is_kept = np.ones(grid.n_used, bool) if kept is None else kept > 0
+    h, no = least_squares(np.where(is_kept, y, 0), sent, amplitude)
+    share = max(1, int(is_kept.sum())) / grid.n_used
+    no = max(no / share, 1e-20)
+    power, v = float(np.mean(np.abs(h) ** 2)) / share, no / float(np.sum(amplitude**2))
     channel = Channel(h, no, max(power - v, 1e-3 * power, 1e-20))
+    if not is_kept.all():
+        for _ in range(FILLS):
+            smooth(h, v, channel, grid)
+            h = np.where(is_kept, h, channel.h)
     smooth(h, v, channel, grid)
     return channel
 
 
 def learn(
     y: Subcarriers, sent: Subcarriers, n_training: int, rotation: NDArray[np.float64],
-    before: Channel, grid: Numerology,
+    before: Channel, grid: Numerology, kept: NDArray[np.float32] | None = None,
 ) -> Channel:  # fmt: skip
     """Estimate the channel again, with the decoded header as further training.
 
@@ -55,15 +67,16 @@ def learn(
     have turned by `rotation` radians `[n − n_training]`. The preamble may have been sent stronger
     than the rest by `strength`, which counts as 1 if it differs from 1 only by chance.
     """
+    whole = np.ones(grid.n_used, np.float32) if kept is None else kept
     y = y.copy()
     y[n_training:] *= np.exp(-1j * rotation)[:, None]
-    ratio = (y / sent)[n_training:]
+    ratio = (whole * y / sent)[n_training:]
     seen = float(np.sum((ratio * before.h.conj()).real))
-    expected = float(np.sum(np.abs(before.h) ** 2)) * len(ratio)
+    expected = float(np.sum(whole * np.abs(before.h) ** 2)) * len(ratio)
     amplitude = np.ones(len(y))
     if seen > 0:
         # The gains may have been scaled to the header.
         strength = expected / seen / before.scaled
         if abs(1 / strength - 1) > SURELY * np.sqrt(0.5 * before.no / expected):
             amplitude[:n_training] = np.clip(strength, 1 / LARGEST_BOOST, LARGEST_BOOST)
-    return estimate(y, sent, amplitude, grid)
+    return estimate(y, sent, amplitude, grid, kept)

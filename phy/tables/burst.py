@@ -51,7 +51,7 @@ class Axes(NamedTuple):
     """Position of each bit of the code's order in a symbol whose bits lie plane by plane."""
 
 
-@block_of("f4[2] f4[2] f4[2] f4[2] f4[2] f4[1] f4[2] f4[1] f8[2] f8[1] f8[1] f8[2] f8[2]")
+@block_of("f4[2] f4[2] f4[2] f4[2] f4[2] f4[1] f4[2] f4[1] f8[2] f8[1] f8[1] f8[2] f8[2] f4[2]")
 class Channel(NamedTuple):
     """What is known of a burst's channel; it is updated during the burst."""
 
@@ -83,6 +83,11 @@ class Channel(NamedTuple):
     """State of both tracking filters `[2, 5]`; see `phy.kernels.tracking`."""
     missed: NDArray[np.float64]
     """By how much the last symbol's pilots differed, times their gains `[2, n_pilots]`."""
+    kept: NDArray[np.float32]
+    """0 for subcarriers that were cut before the FFT, else 1, for each symbol `[n, width]`.
+
+    Row 0 also stands for the known symbols, as long as the channel is estimated.
+    """
 
     @property
     def no(self) -> float:

@@ -124,7 +124,7 @@ class ModemHere:
     @property
     def receiver_counters(self) -> list[int]:
         """The receiver's counters, in the order of `phy.COUNTERS`."""
-        counters = {} if self._receiver is None else self._receiver.counters
+        counters = {} if self._receiving is None else self._receiving.counters
         return [counters.get(name, 0) for name in phy.COUNTERS]
 
     @property

@@ -1,6 +1,10 @@
-"""Feeds the receiver and the energy detector block by block."""
+"""Feeds the receiver and the energy detector block by block, behind the excisor."""
 
+from collections import Counter
 from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 import phy
 from backends import SENDING, RxBlock
@@ -25,6 +29,8 @@ class SensingReceiver:
     ) -> None:
         self._receiver = receiver
         self._sense = sense
+        self._excisor = phy.Excisor()
+        receiver.cuts = self._excisor.cuts
         self._rate_hz = rate_hz
         self._unheard_until = 0
         self.observer: Observer | None = None
@@ -35,17 +41,14 @@ class SensingReceiver:
     def hear(self, block: RxBlock) -> Sequence[phy.Event]:
         """Take a block, and return the events that it completes."""
         if block.samples is None:
-            events = self._receiver.gap(block.n)
+            events = self._take(self._excisor.gap(block.n)) + self._receiver.gap(block.n)
             if self._sense is not None:
                 self._sense.gap(block.n)
                 if block.gap_reason != SENDING:
                     # A burst that started in this gap may still be on the air.
                     self._unheard_until = block.index + block.n
         else:
-            events = self._receiver.push(block.samples)
-            if self._sense is not None:
-                self._sense.explain(self._receiver.claim.end)
-                self._sense.push(block.samples)
+            events = self._take(self._excisor.push(block.samples))
         if self._sense is not None:
             self.sensed = self._sense_air(self._sense)
         if (observer := self.observer) is not None:
@@ -54,12 +57,25 @@ class SensingReceiver:
 
     def flush(self) -> Sequence[phy.Event]:
         """End the stream, and return the events of its last samples."""
-        return self._receiver.flush()
+        return self._take(self._excisor.flush()) + self._receiver.flush()
 
     @property
     def next_index(self) -> int:
         """The index after the last sample heard."""
-        return self._receiver.next_index
+        return self._excisor.next_index
+
+    @property
+    def counters(self) -> Counter[str]:
+        """The counters of receiver and excisor."""
+        return self._receiver.counters + self._excisor.counters
+
+    def _take(self, samples: NDArray[np.complex64]) -> list[phy.Event]:
+        """Give samples without lines to the receiver and the energy detector."""
+        events = self._receiver.push(samples)
+        if self._sense is not None:
+            self._sense.explain(self._receiver.claim.end)
+            self._sense.push(samples)
+        return events
 
     def _sense_air(self, sense: "phy.EnergyDetector") -> Sensed:
         sensed = self._sense_energy(sense, sense.busy_until)

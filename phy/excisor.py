@@ -1,0 +1,127 @@
+"""Takes lines out of a stream before the search: tones, narrow signals, and sweeps."""
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy import compute
+from phy.cuts import Cuts
+from phy.sizes import N_LANES
+from phy.stream import SampleStream
+from phy.tables.notch import SIZE, STRIDE, new_notch_memory
+
+APART = 2 * SIZE
+"""While there are no lines, one window in so many samples is looked at."""
+GROUP = N_LANES * APART
+"""They are looked at in groups, so a line is found within so many samples."""
+RELEASE = 64
+"""Number of windows without a line, one after another, after which all is left as it is."""
+
+
+class Excisor:
+    """Hands on a stream of samples, without lines in its spectrum.
+
+    It acts only while there are lines: then what it hands on is up to SIZE samples behind, and has
+    no DC. Windows lie at absolute indices, so any chunking gives the same samples.
+
+    What misleads it: a burst with the spectrum of lines. The way back: RELEASE windows without one.
+    """
+
+    def __init__(self, start: int = 0) -> None:
+        self.cuts = Cuts()
+        self.counters: Counter[str] = Counter()
+        self._memory = new_notch_memory()
+        self._cut = np.zeros((N_LANES, SIZE), np.uint8)
+        self._found = np.zeros(N_LANES, np.int64)
+        self._room = np.empty(N_LANES * STRIDE, np.complex64)
+        self._raw = SampleStream(start, 1 << 16)
+        self._is_active = False
+        self._restart(start)
+
+    @property
+    def next_index(self) -> int:
+        """Absolute index of the next sample to push."""
+        return self._raw.end
+
+    def push(self, samples: NDArray[np.complex64]) -> NDArray[np.complex64]:
+        """Take the next samples `[n]`; returns those that are ready, complex64."""
+        self.counters["samples_bad"] += self._raw.append(samples)
+        parts: list[NDArray[np.complex64]] = []
+        while self._cut_lines(parts) if self._is_active else self._look(parts):
+            pass
+        self._raw.forget_before(min(self._at, self._next))
+        return parts[0] if len(parts) == 1 else np.concatenate((*parts, np.empty(0, np.complex64)))
+
+    def flush(self) -> NDArray[np.complex64]:
+        """Return the samples that are not handed on yet, as if silence followed."""
+        return self.gap(0)
+
+    def gap(self, n: int) -> NDArray[np.complex64]:
+        """Note that `n` samples are missing; returns those before that were not handed on yet."""
+        if n < 0:
+            raise ValueError(f"gap: got {n} samples; allowed: 0 or more")
+        end, at = self._raw.end, self._at
+        rest = self.push(np.zeros(SIZE + STRIDE, np.complex64))[: end - at]
+        self._restart(end + n)
+        return rest
+
+    def _restart(self, index: int) -> None:
+        """Go on at `index`, with silence before it."""
+        first = (index // STRIDE - 1) * STRIDE
+        self._raw.restart(first)
+        self._raw.append(np.zeros(index - first, np.complex64))
+        self._memory.content.tail[:] = 0
+        self._at = index
+        self._next = first if self._is_active else -(-index // GROUP) * GROUP
+
+    def _look(self, parts: list[NDArray[np.complex64]]) -> bool:
+        """Hand on samples as they are, and look for lines; False: more samples are needed."""
+        end, last = self._raw.end, self._next + GROUP - APART + SIZE
+        if end < last:
+            if end > self._at:
+                # A copy: the stream's room is used again.
+                parts.append(self._raw.view(self._at, end).copy())
+                self._at = end
+            return False
+        x = self._raw.view(self._next, last)
+        found = compute.find_lines(x, N_LANES, APART, self._memory, self._cut)
+        if found < 0:
+            self._next += GROUP
+            return True
+        # Lines go from the next stride on; all up to there may have been handed on already.
+        begin = -(-last // STRIDE) * STRIDE
+        self._is_active, self._n_clean, self._next = True, 0, begin - STRIDE
+        if self._at < begin:
+            ready = min(begin, end)
+            parts.append(self._raw.view(self._at, ready).copy())
+            self._at = ready
+        return True
+
+    def _cut_lines(self, parts: list[NDArray[np.complex64]]) -> bool:
+        """Take lines out of up to eight windows; False: more samples are needed."""
+        n = min((self._raw.end - self._next) // STRIDE - 1, N_LANES)
+        if n < 1:
+            return False
+        x = self._raw.view(self._next, self._next + (n + 1) * STRIDE)
+        compute.cut_lines(x, n, self._memory, self._room, self._cut, self._found)
+        for i in range(n):
+            self._note(self._next // STRIDE + i, i)
+            if self._n_clean == RELEASE:
+                self._is_active, n = False, i + 1
+                break
+        ready = self._next + n * STRIDE
+        if ready > self._at:
+            # What lies before was handed on as it was.
+            parts.append(self._room[self._at - self._next : n * STRIDE].copy())
+            self._at = ready
+        self._next = ready if self._is_active else -(-ready // GROUP) * GROUP
+        return True
+
+    def _note(self, window: int, lane: int) -> None:
+        n = int(self._found[lane])
+        self._n_clean = self._n_clean + 1 if n <= 0 else 0
+        self.counters["windows_notched"] += n > 0
+        self.counters["windows_not_notched"] += n < 0
+        if n > 0:
+            self.cuts.add(window, self._cut[lane].copy())

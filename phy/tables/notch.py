@@ -1,0 +1,61 @@
+"""Tables and working memory of the notch; see `phy.kernels.notch`."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy.sizes import N_LANES
+from phy.tables.block import ArgumentBlock, block_of
+from phy.tables.burst import Planes, Row
+
+SIZE = 512
+"""Samples of a window, and bins of its spectrum."""
+STRIDE = SIZE // 2
+"""Samples from one window to the next. Each sample is in two windows."""
+LINE_DB = 14.0
+"""A bin this far above the median of its window is a line, and is cut with its neighbours."""
+MOST_CUT = 3 * SIZE // 8
+"""Where more bins than these would be cut, nothing is: what is left would be no signal."""
+
+
+@block_of("f4[1] f4[1] f4[2] f4[2] f4[2] f4[2] f4[1] f4[2]")
+class NotchMemory(NamedTuple):
+    """What the notch keeps from call to call, and its working memory."""
+
+    window: Row
+    """Root of a Hann window `[SIZE]`; it is applied before the FFT and after its inverse."""
+    weights: Row
+    """The Hann window, each value twice, of sum 1 `[2 SIZE]`."""
+    constant: Planes
+    """Spectrum of the root: what a constant of 1 looks like `[2, SIZE]`."""
+    twiddles: Planes
+    """exp(−2πj m / SIZE) `[2, SIZE]`."""
+    planes: NDArray[np.float32]
+    """Eight windows, twice `[4, 8 SIZE]`."""
+    powers: NDArray[np.float32]
+    """Power of each bin `[8, SIZE]`."""
+    square: Row
+    """Eight by eight values to transpose."""
+    tail: Planes
+    """Second half of the last window, as it was left `[2, STRIDE]`."""
+
+
+def new_notch_memory() -> ArgumentBlock[NotchMemory]:
+    """Memory of a notch, with silence before it."""
+    m = np.arange(SIZE)
+    root = np.sin(np.pi * (m + 0.5) / SIZE)
+    spectrum = np.fft.fft(root)
+    circle = np.exp(-2j * np.pi * m / SIZE)
+    return ArgumentBlock(
+        NotchMemory(
+            window=root.astype(np.float32),
+            weights=np.repeat(root**2 * (2 / SIZE), 2).astype(np.float32),
+            constant=np.stack((spectrum.real, spectrum.imag)).astype(np.float32),
+            twiddles=np.stack((circle.real, circle.imag)).astype(np.float32),
+            planes=np.empty((4, N_LANES * SIZE), np.float32),
+            powers=np.empty((N_LANES, SIZE), np.float32),
+            square=np.empty(N_LANES * N_LANES, np.float32),
+            tail=np.zeros((2, STRIDE), np.float32),
+        )
+    )

@@ -1,0 +1,197 @@
+"""Lines in the spectrum are cut, nothing else is; and the receiver knows what was cut."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phy import (
+    GRIDS,
+    MCS_TABLE,
+    OFDM_64_16,
+    EnergyDetector,
+    Excisor,
+    Jammer,
+    Transmitter,
+    reference,
+)
+from phy.engine import in_use
+from phy.testing import compute, new_notch_memory, notch_tables
+from tests.phy.signals import heard, noise, noisy, payloads, silence
+
+SIZE, STRIDE = notch_tables.SIZE, notch_tables.STRIDE
+RATE_HZ = 1e6
+SETTLED = 12_000
+"""Samples after which a line that stays is cut."""
+GRID = OFDM_64_16
+SEED = 47
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(SEED)
+
+
+def through(x, excisor=None, cuts=()):
+    """The samples that an excisor hands on of `x`, pushed in pieces that end at `cuts`."""
+    excisor = excisor or Excisor()
+    parts = [excisor.push(each) for each in np.split(x, cuts)]
+    return np.concatenate((*parts, excisor.flush()))
+
+
+def jammed(rng, x, kind, power_db, **settings):
+    """`x`, SETTLED samples later, beside a jammer so far above a mean power of 1."""
+    jammer = Jammer(kind, power_db, RATE_HZ, int(rng.integers(1 << 30)), **settings)
+    return jammer.add(np.concatenate((noise(rng, SETTLED, 0.01), x)), 0)
+
+
+def received(x, receiver, excisor=None):
+    """The PDUs that a receiver hears behind an excisor."""
+    excisor = excisor or Excisor()
+    receiver.cuts = excisor.cuts
+    return heard(receiver.push(excisor.push(x)) + receiver.push(excisor.flush()) + receiver.flush())
+
+
+def a_stream(rng, n, size, mcs, snr_db, grid=GRID):
+    """(PDUs, their bursts one after another, in noise)."""
+    pdus = payloads(rng, n, size)
+    transmitter = Transmitter(grid=grid)
+    parts = [np.concatenate((silence(700), transmitter.modulate([each], mcs))) for each in pdus]
+    return pdus, noisy(rng, np.concatenate((*parts, silence(3000))), snr_db)
+
+
+@pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
+def test_in_clean_air_hardly_anything_is_cut(rng, grid):
+    """Each window is looked at, not only those that an excisor without lines looks at."""
+    n, cut, found, n_windows, cuts = 8, np.zeros((8, SIZE), np.uint8), np.zeros(8, int), 0, []
+    for mcs in MCS_TABLE:
+        for snr_db in (0, 10, 40):
+            _, x = a_stream(rng, 2, 400, mcs.index, snr_db, grid)
+            memory, out = new_notch_memory(), np.empty(n * STRIDE, np.complex64)
+            for begin in range(0, len(x) - (n + 1) * STRIDE, n * STRIDE):
+                piece = x[begin : begin + (n + 1) * STRIDE]
+                compute.cut_lines(piece, n, memory, out, cut, found)
+                n_windows += n
+                cuts += found[found != 0].tolist()
+    assert len(cuts) <= 0.01 * n_windows
+    assert set(cuts) <= {3}
+
+
+@pytest.mark.parametrize(
+    ("kind", "power_db", "settings"),
+    [
+        ("tone", 0, {"offset_hz": 123e3}),
+        ("tone", 40, {"offset_hz": -312e3}),
+        ("tone", 20, {"offset_hz": 100.0}),
+        ("tone", 20, {"offset_hz": 4e3}),
+        ("tone", 20, {"offset_hz": -13e3}),
+        ("narrow", 10, {"offset_hz": 200e3, "width_hz": 40e3}),
+        ("sweep", 10, {"period_s": 0.01}),
+    ],
+)
+def test_beside_a_jammer_bursts_are_heard(rng, kind, power_db, settings):
+    pdus, x = a_stream(rng, 10, 64, 1, 15)
+    x = jammed(rng, x, kind, power_db, **settings)
+    assert received(x, in_use().receiver()) == pdus
+    assert not heard(in_use().receiver().push(x))
+
+
+@given(st.integers(0, 1 << 30), st.lists(st.integers(0, 60_000), max_size=8), st.integers(0, 3000))
+def test_any_chunking_gives_the_same_samples(seed, cuts, gap):
+    rng = np.random.default_rng(seed)
+    settings = {"times": [(0.002, 0.02), (0.055, 0.058)], "offset_hz": rng.uniform(-4e5, 4e5)}
+    jammer = Jammer("tone", rng.uniform(0, 40), RATE_HZ, seed, **settings)
+    x = jammer.add(noise(rng, 60_000, 0.1) + np.complex64(rng.uniform(0, 2)), 0)
+    late = jammer.add(noise(rng, 10_000, 0.1), len(x) + gap)
+    whole, parts = Excisor(), Excisor()
+    at_once = (whole.push(x), whole.gap(gap), whole.push(late), whole.flush())
+    split = [parts.push(each) for each in np.split(x, sorted(cuts))]
+    others = (*split, parts.gap(gap), parts.push(late), parts.flush())
+    assert len(np.concatenate(at_once)) == len(x) + len(late)
+    assert np.array_equal(np.concatenate(at_once), np.concatenate(others))
+    assert whole.counters == parts.counters
+
+
+def test_a_constant_is_no_line(rng):
+    x = noise(rng, 40_000) + np.complex64(10 - 3j)
+    excisor = Excisor()
+    assert np.array_equal(through(x, excisor), x)
+    assert not excisor.counters["windows_notched"]
+
+
+def test_half_of_the_band_is_not_cut(rng):
+    spectrum = np.fft.fft(noise(rng, 40_000))
+    spectrum[1_000:18_000] *= 30
+    x, excisor = np.fft.ifft(spectrum).astype(np.complex64), Excisor()
+    # Something narrow makes it look at each window.
+    x[:20_000] += 1e4 * np.exp(-2j * np.pi * 0.2 * np.arange(20_000))
+    more = through(x, excisor)[22_000:] - x[22_000:]
+    # But DC, which is cut in every window.
+    assert np.mean(np.abs(more) ** 2) < 0.02 * np.mean(np.abs(x[22_000:]) ** 2)
+    assert excisor.counters["windows_not_notched"] > 10
+
+
+def test_when_the_jammer_ends_all_is_left_again(rng):
+    x, excisor = noise(rng, 90_000, 0.1), Excisor()
+    jammer = Jammer("tone", 30, RATE_HZ, 1, offset_hz=1e5, times=[(0, 0.03)])
+    out = through(jammer.add(x, 0), excisor)
+    assert np.array_equal(out[30_000 + 66 * STRIDE :], x[30_000 + 66 * STRIDE :])
+    assert excisor.counters["windows_notched"] < 30_000 / STRIDE
+
+
+def test_beside_a_tone_the_channel_is_idle(rng):
+    x = Jammer("tone", 20, RATE_HZ, 1, offset_hz=1e5).add(noise(rng, 200_000), 0)
+    sense, excisor, busy = EnergyDetector(), Excisor(), []
+    for each in np.split(x, 200):
+        sense.push(excisor.push(each))
+        busy.append(sense.busy_until == sense.next_index)
+    assert sum(busy[50:]) <= 3
+
+
+def test_the_reference_cuts_the_same(rng):
+    x = noise(rng, 9 * STRIDE, 0.1) + np.complex64(1)
+    x = Jammer("narrow", 20, RATE_HZ, 1, offset_hz=1e5, width_hz=3e4).add(x, 0)
+    made = []
+    for kernels in (vars(reference)["KERNELS"], in_use().kernels):
+        out, cut = np.empty(8 * STRIDE, np.complex64), np.zeros((8, SIZE), np.uint8)
+        memory, found = new_notch_memory(), np.zeros(8, np.int64)
+        kernels["cut_lines"](x, 8, memory, out, cut, found)
+        lines = kernels["find_lines"](x, 2, 4 * STRIDE, new_notch_memory(), cut.copy())
+        made.append((out, cut, found, lines, memory.content.tail))
+    for a, b in zip(*made, strict=True):
+        assert np.allclose(a, b, atol=1e-4)
+    assert made[0][1].any()
+
+
+def test_what_was_cut_is_known_by_subcarrier(rng):
+    excisor = Excisor()
+    x = jammed(rng, noise(rng, 9_000, 0.01), "tone", 0, offset_hz=10.5 / 64 * RATE_HZ)
+    through(x, excisor)
+    starts = np.array([100, 15_000, 15_080])
+    kept = excisor.cuts.kept(starts, 0.0, GRID)
+    cut = [set(GRID.used[row == 0].tolist()) for row in kept]
+    assert cut == [set(), {10, 11}, {10, 11}]
+    moved = excisor.cuts.kept(starts[1:], 1 / 64, GRID)
+    assert set(GRID.used[moved[0] == 0].tolist()) == {9, 10}
+    assert excisor.cuts.kept(np.array([90_000]), 0.0, GRID) is None
+
+
+@pytest.mark.parametrize("engine", ["in use", "reference"])
+def test_64qam_is_read_around_lines(rng, engine):
+    """Without the knowledge of what was cut, most of these are lost."""
+    _, x = a_stream(rng, 20, 220, 7, 25)
+    for offset_hz in (-271e3, 83e3, 207e3):
+        x = Jammer("tone", 5, RATE_HZ, 1, offset_hz=offset_hz).add(x, 0)
+    x = np.concatenate((x[:SETTLED], x))
+    kind, n_heard = reference.Receiver if engine == "reference" else in_use().receiver, []
+    for knows in (True, False):
+        receiver, excisor = kind(), Excisor()
+        receiver.cuts = excisor.cuts if knows else None
+        n_heard.append(len(heard(receiver.push(excisor.push(x)) + receiver.flush())))
+    assert n_heard[0] >= 10
+    assert n_heard[1] <= 5
+
+
+def test_impossible_gaps_are_refused():
+    with pytest.raises(ValueError, match="gap: got -1 samples"):
+        Excisor().gap(-1)
