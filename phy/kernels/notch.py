@@ -57,8 +57,8 @@ def cut_lines(
     """Write the first halves of `n` ≤ 8 windows of `x`, STRIDE apart, to `out`, without lines.
 
     A line so near to 0 that it may be taken for DC goes, too, in each window: only seldom is it
-    seen. `cut` `[8, SIZE]` gets 1 for each other bin that was cut, `found` `[8]` how many there are in each
-    window; −1: too many, and none was cut.
+    seen. `cut` `[8, SIZE]` gets 1 for each other bin that was cut, `found` `[8]` how many there are
+    in each window; −1: too many, and none was cut.
     """
     memory = open_notch(memory_in)
     swapped = _spectra(x, n, STRIDE, memory)

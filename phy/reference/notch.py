@@ -55,7 +55,7 @@ def _spectra(
 
 
 def _judge(power: NDArray[np.float64], cut: NDArray[np.uint8]) -> int:
-    """Mark the bins to cut: those LINE_DB above the median, and their neighbours; −1: too many."""
+    """Mark the bins to cut: those LINE_DB above the median, and their neighbors; −1: too many."""
     lines = power > 10 ** (LINE_DB / 10) * np.median(power)
     cut[:] = lines | np.roll(lines, 1) | np.roll(lines, -1)
     n = int(cut.sum())

@@ -14,7 +14,7 @@ SIZE = 512
 STRIDE = SIZE // 2
 """Samples from one window to the next. Each sample is in two windows."""
 LINE_DB = 14.0
-"""A bin this far above the median of its window is a line, and is cut with its neighbours."""
+"""A bin this far above the median of its window is a line, and is cut with its neighbors."""
 MOST_CUT = 3 * SIZE // 8
 """Where more bins than these would be cut, nothing is: what is left would be no signal."""
 
