@@ -29,10 +29,10 @@ class Cuts:
     ) -> NDArray[np.float32] | None:
         """1 for each subcarrier that FFT windows at absolute `starts` hold whole, else 0.
 
-        The shape is `[n, n_used]`; None: nothing was cut. `frequency` is the
-        sender's offset in cycles per sample.
+        The shape is `[n, n_used]`; None: nothing was cut. `frequency` is the sender's offset in
+        cycles per sample.
         """
-        if not self._masks or max(self._masks) < starts[0] // STRIDE - 1:
+        if not self._masks or next(reversed(self._masks)) < starts[0] // STRIDE - 1:
             return None
         rows = np.ones((len(starts), grid.n_used), np.float32)
         found = False

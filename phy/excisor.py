@@ -62,7 +62,11 @@ class Excisor:
         if n < 0:
             raise ValueError(f"gap: got {n} samples; allowed: 0 or more")
         end, at = self._raw.end, self._at
-        rest = self.push(np.zeros(SIZE + STRIDE, np.complex64))[: end - at]
+        rest = np.empty(0, np.complex64)
+        if self._is_active:
+            rest = self.push(np.zeros(SIZE + STRIDE, np.complex64))[: end - at]
+        elif end >= self._next + SIZE and self._has_lines((end - self._next - SIZE) // APART + 1):
+            self._is_active, self._n_clean = True, 0
         self._restart(end + n)
         return rest
 
@@ -73,7 +77,7 @@ class Excisor:
         self._raw.append(np.zeros(index - first, np.complex64))
         self._memory.content.tail[:] = 0
         self._at = index
-        self._next = first if self._is_active else -(-index // GROUP) * GROUP
+        self._next = first if self._is_active else first + 2 * STRIDE
 
     def _look(self, parts: list[NDArray[np.complex64]]) -> bool:
         """Hand on samples as they are, and look for lines; False: more samples are needed."""
@@ -84,9 +88,7 @@ class Excisor:
                 parts.append(self._raw.view(self._at, end).copy())
                 self._at = end
             return False
-        x = self._raw.view(self._next, last)
-        found = compute.find_lines(x, N_LANES, APART, self._memory, self._cut)
-        if found < 0:
+        if not self._has_lines(N_LANES):
             self._next += GROUP
             return True
         # Lines go from the next stride on; all up to there may have been handed on already.
@@ -97,6 +99,11 @@ class Excisor:
             parts.append(self._raw.view(self._at, ready).copy())
             self._at = ready
         return True
+
+    def _has_lines(self, n: int) -> bool:
+        """Whether one of the next `n` windows that are looked at has lines."""
+        x = self._raw.view(self._next, self._next + (n - 1) * APART + SIZE)
+        return bool(compute.find_lines(x, n, APART, self._memory, self._cut) >= 0)
 
     def _cut_lines(self, parts: list[NDArray[np.complex64]]) -> bool:
         """Take lines out of up to eight windows; False: more samples are needed."""
@@ -115,7 +122,7 @@ class Excisor:
             # What lies before was handed on as it was.
             parts.append(self._room[self._at - self._next : n * STRIDE].copy())
             self._at = ready
-        self._next = ready if self._is_active else -(-ready // GROUP) * GROUP
+        self._next = ready
         return True
 
     def _note(self, window: int, lane: int) -> None:

@@ -148,6 +148,17 @@ def test_beside_a_tone_the_channel_is_idle(rng):
     assert sum(busy[50:]) <= 3
 
 
+def test_a_robot_that_listens_for_moments_finds_lines(rng):
+    """Half duplex: its own bursts make gaps in what it hears."""
+    jammer, excisor, index = Jammer("tone", 20, RATE_HZ, 1, offset_hz=1e5), Excisor(), 0
+    for _ in range(40):
+        x = jammer.add(noise(rng, 1500), index)
+        heard_of_it = np.concatenate((excisor.push(x), excisor.gap(2000)))
+        index += 3500
+    assert excisor.counters["windows_notched"] > 35 * 5
+    assert np.mean(np.abs(heard_of_it[STRIDE:-STRIDE]) ** 2) < 1.5
+
+
 def test_the_reference_cuts_the_same(rng):
     x = noise(rng, 9 * STRIDE, 0.1) + np.complex64(1)
     x = Jammer("narrow", 20, RATE_HZ, 1, offset_hz=1e5, width_hz=3e4).add(x, 0)
