@@ -35,15 +35,19 @@ class Cuts:
         if not self._masks or next(reversed(self._masks)) < starts[0] // STRIDE - 1:
             return None
         rows = np.ones((len(starts), grid.n_used), np.float32)
-        found = False
+        # Most symbols beside a line have lost the same.
+        known: dict[bytes, NDArray[np.bool_]] = {}
         for row, start in zip(rows, starts.tolist(), strict=True):
             # A sample is in the window that begins in its stride, and in the one before.
             span = range(start // STRIDE - 1, (start + grid.n_fft - 1) // STRIDE + 1)
             masks = [self._masks[each] for each in span if each in self._masks]
             if masks:
-                found = True
-                row[:] = _lost(np.maximum.reduce(masks), frequency, grid) < MOST_LOST
-        return rows if found else None
+                mask = np.maximum.reduce(masks)
+                key = mask.tobytes()
+                if key not in known:
+                    known[key] = _lost(mask, frequency, grid) < MOST_LOST
+                row[:] = known[key]
+        return rows if known else None
 
 
 def _lost(mask: NDArray[np.uint8], frequency: float, grid: Numerology) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from phy.tables.notch import SIZE, STRIDE, new_notch_memory
 APART = 2 * SIZE
 """While there are no lines, one window in so many samples is looked at."""
 GROUP = N_LANES * APART
-"""They are looked at in groups, so a line is found within so many samples."""
+"""They are looked at in groups: a line is found after about so many samples."""
 RELEASE = 64
 """Number of windows without a line, one after another, after which all is left as it is."""
 
@@ -45,7 +45,7 @@ class Excisor:
         return self._raw.end
 
     def push(self, samples: NDArray[np.complex64]) -> NDArray[np.complex64]:
-        """Take the next samples `[n]`; returns those that are ready, complex64."""
+        """Take the next samples `[n]`; returns those that are ready, valid until the next call."""
         self.counters["samples_bad"] += self._raw.append(samples)
         parts: list[NDArray[np.complex64]] = []
         while self._cut_lines(parts) if self._is_active else self._look(parts):
@@ -64,7 +64,7 @@ class Excisor:
         end, at = self._raw.end, self._at
         rest = np.empty(0, np.complex64)
         if self._is_active:
-            rest = self.push(np.zeros(SIZE + STRIDE, np.complex64))[: end - at]
+            rest = self.push(np.zeros(SIZE + STRIDE, np.complex64))[: end - at].copy()
         elif end >= self._next + SIZE and self._has_lines((end - self._next - SIZE) // APART + 1):
             self._is_active, self._n_clean = True, 0
         self._restart(end + n)
@@ -84,8 +84,7 @@ class Excisor:
         end, last = self._raw.end, self._next + GROUP - APART + SIZE
         if end < last:
             if end > self._at:
-                # A copy: the stream's room is used again.
-                parts.append(self._raw.view(self._at, end).copy())
+                parts.append(self._raw.view(self._at, end))
                 self._at = end
             return False
         if not self._has_lines(N_LANES):
@@ -96,7 +95,7 @@ class Excisor:
         self._is_active, self._n_clean, self._next = True, 0, begin - STRIDE
         if self._at < begin:
             ready = min(begin, end)
-            parts.append(self._raw.view(self._at, ready).copy())
+            parts.append(self._raw.view(self._at, ready))
             self._at = ready
         return True
 

@@ -20,7 +20,7 @@ from phy.tables.notch import LINE_DB, MOST_CUT, SIZE, STRIDE, NotchMemory
 
 _LINE = 10 ** (LINE_DB / 10)
 # A window whose strongest bin has less than this times the mean of all has no line.
-_EVEN = 8.0
+_EVEN = 10.0
 # Steps of the search for the median between twice the mean and 100 dB less.
 _STEPS, _LEAST = 13, 1e-10
 
@@ -38,9 +38,9 @@ def find_lines(
     Its bins that are lines are 1 in `cut` `[8, SIZE]`.
     """
     memory = open_notch(memory_in)
-    _spectra(x, n, apart, memory)
+    swapped = _spectra(x, n, apart, memory)
     for lane in range(n):
-        if _judge(lane, memory, cut[lane]) > 0:
+        if _judge(lane, swapped, memory, cut[lane]) > 0:
             return lane
     return -1
 
@@ -66,7 +66,7 @@ def cut_lines(
     re, im = (planes[2], planes[3]) if swapped else (planes[0], planes[1])
     to_re, to_im = (planes[0], planes[1]) if swapped else (planes[2], planes[3])
     for lane in range(n):
-        found[lane] = _judge(lane, memory, cut[lane])
+        found[lane] = _judge(lane, swapped, memory, cut[lane])
         if found[lane] >= 0:
             for k in range(SIZE):
                 if cut[lane, k] or k <= 1 or k == SIZE - 1:
@@ -87,20 +87,20 @@ def cut_lines(
 
 @step
 def _spectra(x: NDArray[np.complex64], n: int, apart: int, memory: NotchMemory) -> bool:
-    """Write the windows' spectra to the planes, and their powers; True: to the second pair.
+    """Write the windows' spectra to the planes; True: to the second pair.
 
-    Both are without DC, which is no line: a receiver takes it out by itself. `square` gets the sum
+    They are without DC, which is no line: a receiver takes it out by itself. `square` gets the sum
     of each window's powers, and behind these the largest of each.
     """
     planes, square, window, weights = memory.planes, memory.square, memory.window, memory.weights
-    flat, powers, constant = x.view(np.float32), memory.powers, memory.constant
+    flat, constant = x.view(np.float32), memory.constant
     for lane in range(N_LANES):
         # Unused lanes repeat the last window, so nothing beyond the samples is read.
         begin = 2 * min(lane, n - 1) * apart
-        sums: Lanes = splat(0)
+        total: Lanes = splat(0)
         for i in range(begin, begin + 2 * SIZE, N_LANES):
-            sums = sums + load(flat, i) * load(weights, i - begin)
-        mean = complex(pairs(sums))
+            total = total + load(flat, i) * load(weights, i - begin)
+        mean = complex(pairs(total))
         square[lane], square[N_LANES + lane] = mean.real, mean.imag
     mean_re, mean_im = load(square, 0), load(square, N_LANES)
     for m in range(0, SIZE, N_LANES // 2):
@@ -113,34 +113,33 @@ def _spectra(x: NDArray[np.complex64], n: int, apart: int, memory: NotchMemory) 
             store(planes[1], N_LANES * (m + i), load(square, 2 * N_LANES * i + N_LANES) * w)
     swapped = transform(planes[0], planes[1], planes[2], planes[3], SIZE, memory.twiddles)
     at_re, at_im = (planes[2], planes[3]) if swapped else (planes[0], planes[1])
-    sum_of: Lanes = splat(0)
+    sums: Lanes = splat(0)
     largest: Lanes = splat(0)
-    for first in range(0, SIZE, N_LANES):
-        for i in range(N_LANES):
-            k = first + i
-            c, d = splat(constant[0, k]), splat(constant[1, k])
-            a = load(at_re, N_LANES * k) - (mean_re * c - mean_im * d)
-            b = load(at_im, N_LANES * k) - (mean_re * d + mean_im * c)
-            store(at_re, N_LANES * k, a)
-            store(at_im, N_LANES * k, b)
-            power: Lanes = a * a + b * b
-            sum_of, largest = sum_of + power, most(largest, power)
-            store(square, N_LANES * i, power)
-        transpose(square)
-        for lane in range(N_LANES):
-            store(powers, SIZE * lane + first, load(square, N_LANES * lane))
-    store(square, 0, sum_of)
+    for k in range(SIZE):
+        c, d = splat(constant[0, k]), splat(constant[1, k])
+        a = load(at_re, N_LANES * k) - (mean_re * c - mean_im * d)
+        b = load(at_im, N_LANES * k) - (mean_re * d + mean_im * c)
+        store(at_re, N_LANES * k, a)
+        store(at_im, N_LANES * k, b)
+        power: Lanes = a * a + b * b
+        sums, largest = sums + power, most(largest, power)
+    store(square, 0, sums)
     store(square, N_LANES, largest)
     return swapped
 
 
 @step
-def _judge(lane: int, memory: NotchMemory, cut: NDArray[np.uint8]) -> int:
+def _judge(lane: int, swapped: bool, memory: NotchMemory, cut: NDArray[np.uint8]) -> int:
     """Mark the bins of a window to cut; returns their number, or −1 if they are too many."""
-    power, mean = memory.powers[lane], float(memory.square[lane]) / SIZE
+    power, mean = memory.power, float(memory.square[lane]) / SIZE
     cut[:] = 0
     if not memory.square[N_LANES + lane] > _EVEN * mean:
         return 0
+    planes = memory.planes
+    re, im = (planes[2], planes[3]) if swapped else (planes[0], planes[1])
+    for k in range(SIZE):
+        a, b = re[N_LANES * k + lane], im[N_LANES * k + lane]
+        power[k] = a * a + b * b
     # Of each pair, the lower bound has at most half of the bins below it, the upper one more.
     low, high = mean * _LEAST, 2.0 * mean
     for _ in range(_STEPS):

@@ -19,7 +19,7 @@ MOST_CUT = 3 * SIZE // 8
 """Where more bins than these would be cut, nothing is: what is left would be no signal."""
 
 
-@block_of("f4[1] f4[1] f4[2] f4[2] f4[2] f4[2] f4[1] f4[2]")
+@block_of("f4[1] f4[1] f4[2] f4[2] f4[2] f4[1] f4[1] f4[2]")
 class NotchMemory(NamedTuple):
     """What the notch keeps from call to call, and its working memory."""
 
@@ -33,8 +33,8 @@ class NotchMemory(NamedTuple):
     """exp(−2πj m / SIZE) `[2, SIZE]`."""
     planes: NDArray[np.float32]
     """Eight windows, twice `[4, 8 SIZE]`."""
-    powers: NDArray[np.float32]
-    """Power of each bin `[8, SIZE]`."""
+    power: Row
+    """Power of each bin of one window `[SIZE]`."""
     square: Row
     """Eight by eight values to transpose."""
     tail: Planes
@@ -54,7 +54,7 @@ def new_notch_memory() -> ArgumentBlock[NotchMemory]:
             constant=np.stack((spectrum.real, spectrum.imag)).astype(np.float32),
             twiddles=np.stack((circle.real, circle.imag)).astype(np.float32),
             planes=np.empty((4, N_LANES * SIZE), np.float32),
-            powers=np.empty((N_LANES, SIZE), np.float32),
+            power=np.empty(SIZE, np.float32),
             square=np.empty(N_LANES * N_LANES, np.float32),
             tail=np.zeros((2, STRIDE), np.float32),
         )

@@ -35,7 +35,7 @@ def rng():
 def through(x, excisor=None, cuts=()):
     """The samples that an excisor hands on of `x`, pushed in pieces that end at `cuts`."""
     excisor = excisor or Excisor()
-    parts = [excisor.push(each) for each in np.split(x, cuts)]
+    parts = [excisor.push(each).copy() for each in np.split(x, cuts)]
     return np.concatenate((*parts, excisor.flush()))
 
 
@@ -104,9 +104,9 @@ def test_any_chunking_gives_the_same_samples(seed, cuts, gap):
     x = jammer.add(noise(rng, 60_000, 0.1) + np.complex64(rng.uniform(0, 2)), 0)
     late = jammer.add(noise(rng, 10_000, 0.1), len(x) + gap)
     whole, parts = Excisor(), Excisor()
-    at_once = (whole.push(x), whole.gap(gap), whole.push(late), whole.flush())
-    split = [parts.push(each) for each in np.split(x, sorted(cuts))]
-    others = (*split, parts.gap(gap), parts.push(late), parts.flush())
+    at_once = (whole.push(x).copy(), whole.gap(gap), whole.push(late).copy(), whole.flush())
+    split = [parts.push(each).copy() for each in np.split(x, sorted(cuts))]
+    others = (*split, parts.gap(gap), parts.push(late).copy(), parts.flush())
     assert len(np.concatenate(at_once)) == len(x) + len(late)
     assert np.array_equal(np.concatenate(at_once), np.concatenate(others))
     assert whole.counters == parts.counters
@@ -153,7 +153,7 @@ def test_a_robot_that_listens_for_moments_finds_lines(rng):
     jammer, excisor, index = Jammer("tone", 20, RATE_HZ, 1, offset_hz=1e5), Excisor(), 0
     for _ in range(40):
         x = jammer.add(noise(rng, 1500), index)
-        heard_of_it = np.concatenate((excisor.push(x), excisor.gap(2000)))
+        heard_of_it = np.concatenate((excisor.push(x).copy(), excisor.gap(2000)))
         index += 3500
     assert excisor.counters["windows_notched"] > 35 * 5
     assert np.mean(np.abs(heard_of_it[STRIDE:-STRIDE]) ** 2) < 1.5
