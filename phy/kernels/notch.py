@@ -56,9 +56,9 @@ def cut_lines(
 ) -> None:
     """Write the first halves of `n` ≤ 8 windows of `x`, STRIDE apart, to `out`, without lines.
 
-    A line so near to 0 that it may be taken for DC goes, too, in each window: only seldom is it
-    seen. `cut` `[8, SIZE]` gets 1 for each other bin that was cut, `found` `[8]` how many there are
-    in each window; −1: too many, and none was cut.
+    DC goes, too, and with it a line that is too near to 0 to be told from it. `cut` `[8, SIZE]`
+    gets 1 for each bin that was cut, `found` `[8]` how many there are in each window; −1: too many,
+    and none was cut.
     """
     memory = open_notch(memory_in)
     swapped = _spectra(x, n, STRIDE, memory)
@@ -67,9 +67,9 @@ def cut_lines(
     to_re, to_im = (planes[0], planes[1]) if swapped else (planes[2], planes[3])
     for lane in range(n):
         found[lane] = _judge(lane, swapped, memory, cut[lane])
-        if found[lane] >= 0:
+        if found[lane] > 0:
             for k in range(SIZE):
-                if cut[lane, k] or k <= 1 or k == SIZE - 1:
+                if cut[lane, k]:
                     re[N_LANES * k + lane] = im[N_LANES * k + lane] = 0
     # An FFT with both parts exchanged is the inverse, times SIZE.
     if transform(im, re, to_im, to_re, SIZE, memory.twiddles):

@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from phy.tables.block import ArgumentBlock
 from phy.tables.notch import LINE_DB, MOST_CUT, SIZE, STRIDE, NotchMemory
 
-_BINS = np.arange(SIZE)
-
 
 def find_lines(
     x: NDArray[np.complex64],
@@ -35,9 +33,7 @@ def cut_lines(
     window = memory.window
     for i, spectrum in enumerate(_spectra(x, n, STRIDE, memory)):
         found[i] = _judge(np.abs(spectrum) ** 2, cut[i])
-        # A line that may be taken for DC is seen only seldom.
-        gone = (cut[i] > 0) | (np.isin(_BINS, (0, 1, SIZE - 1)) & (found[i] >= 0))
-        y = window * np.fft.ifft(np.where(gone, 0, spectrum))
+        y = window * np.fft.ifft(np.where(cut[i], 0, spectrum))
         out[i * STRIDE : (i + 1) * STRIDE] = y[:STRIDE] + (memory.tail[0] + 1j * memory.tail[1])
         memory.tail[:] = y[STRIDE:].real, y[STRIDE:].imag
 

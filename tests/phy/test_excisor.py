@@ -96,6 +96,15 @@ def test_beside_a_jammer_bursts_are_heard(rng, kind, power_db, settings):
     assert not heard(in_use().receiver().push(x))
 
 
+@pytest.mark.parametrize(
+    ("power_db", "offset_hz"), [(0, 100.0), (0, 200.0), (0, 400.0), (40, 40.0), (40, 100.0)]
+)
+def test_a_tone_that_looks_like_dc_does_no_harm(rng, power_db, offset_hz):
+    pdus, x = a_stream(rng, 10, 64, 1, 15)
+    x = jammed(rng, x, "tone", power_db, offset_hz=offset_hz)
+    assert received(x, in_use().receiver()) == pdus
+
+
 @given(st.integers(0, 1 << 30), st.lists(st.integers(0, 60_000), max_size=8), st.integers(0, 3000))
 def test_any_chunking_gives_the_same_samples(seed, cuts, gap):
     rng = np.random.default_rng(seed)
