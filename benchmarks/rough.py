@@ -35,7 +35,7 @@ class _Jammed(NamedTuple):
     """A jammer, its power above the burst's, the bursts, and the largest share lost."""
 
     name: str
-    kind: Literal["tone", "narrow", "sweep"]
+    kind: Literal["tone", "narrow", "sweep", "pulses"]
     power_db: float
     n_tones: int
     target: float
@@ -51,10 +51,13 @@ _JAMMED = (
     _Jammed("three_tones_lost_10db", "tone", 10, 3, 0.005),
     _Jammed("narrow_lost_10db", "narrow", 10, 1, 0.005),
     _Jammed("sweep_10ms_lost_10db", "sweep", 10, 1, 0.005),
+    _Jammed("pulses_2pct_lost_0db", "pulses", 0, 1, 0.02),
+    _Jammed("pulses_2pct_lost_10db", "pulses", 10, 1, 0.03),
     _Jammed("cw_20db_64qam34_220B_25db", "tone", 20, 1, 0.015, QAM64_34, 220, 25.0),
     _Jammed("three_tones_10db_64qam34_220B_25db", "tone", 10, 3, 0.05, QAM64_34, 220, 25.0),
 )
-_JAMMED_HZ, _SETTLED, _AT_ONCE = 1e6, 12_000, 10
+_JAMMED_HZ, _SETTLED, _AT_ONCE = 1e6, 20_000, 10
+_DUTY, _PERIOD_S = 0.02, {"tone": 1.0, "narrow": 1.0, "sweep": 0.01, "pulses": 0.001}
 _LIQUID_FRAMES, _LIQUID_PPM = 300, 1.0
 _PATIENCE_S = 0.04
 """As the modem of a daemon has it."""
@@ -191,6 +194,8 @@ def _beside(jammed: _Jammed, seed: int, quick: bool) -> Row:
 def _jammed_lost(jammed: _Jammed, seed: int, n: int) -> ErrorRate:
     rng, transmitter, errors = np.random.default_rng(seed), Transmitter(), 0
     share_db = jammed.power_db - 10 * np.log10(jammed.n_tones)
+    if jammed.kind == "pulses":
+        share_db -= 10 * np.log10(_DUTY)
     for _ in range(n // _AT_ONCE):
         pdus = [rng.bytes(jammed.n_bytes) for _ in range(_AT_ONCE)]
         gaps = rng.integers(1200, 1800, _AT_ONCE)
@@ -205,7 +210,7 @@ def _jammed_lost(jammed: _Jammed, seed: int, n: int) -> ErrorRate:
             width_hz = 3 / 64 * _JAMMED_HZ if jammed.kind == "narrow" else 0.0
             x = Jammer(
                 jammed.kind, share_db, _JAMMED_HZ, int(rng.integers(1 << 30)),
-                offset_hz=offset_hz, width_hz=width_hz,
+                offset_hz=offset_hz, width_hz=width_hz, period_s=_PERIOD_S[jammed.kind], duty=_DUTY,
             ).add(x, int(rng.integers(10_000)))  # fmt: skip
         receiver, excisor = Receiver(), Excisor()
         receiver.cuts = excisor.cuts

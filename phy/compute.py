@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from phy.kernels import acquire as acquire
     from phy.kernels import add_noise as add_noise
+    from phy.kernels import blank as blank
     from phy.kernels import convolve as convolve
     from phy.kernels import cut_lines as cut_lines
     from phy.kernels import decode_blocks as decode_blocks
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from phy.kernels import encode_blocks as encode_blocks
     from phy.kernels import filter_strided as filter_strided
     from phy.kernels import find_lines as find_lines
+    from phy.kernels import find_pulses as find_pulses
     from phy.kernels import interpolate as interpolate
     from phy.kernels import learn_channel as learn_channel
     from phy.kernels import list_decode as list_decode

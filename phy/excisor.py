@@ -1,4 +1,4 @@
-"""Takes lines out of a stream before the search: tones, narrow signals, and sweeps."""
+"""Takes lines and pulses out of a stream before the search: tones, sweeps, ignition, radars."""
 
 from collections import Counter
 
@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy import compute
+from phy.blanker import Blanker
 from phy.cuts import Cuts
 from phy.sizes import N_LANES
 from phy.stream import SampleStream
 from phy.tables.notch import SIZE, STRIDE, new_notch_memory
 
-APART = 2 * SIZE
+APART = 4 * SIZE
 """While there are no lines, one window in so many samples is looked at."""
 GROUP = N_LANES * APART
 """They are looked at in groups: a line is found after about so many samples."""
@@ -20,10 +21,10 @@ RELEASE = 64
 
 
 class Excisor:
-    """Hands on a stream of samples, without lines in its spectrum.
+    """Hands on a stream of samples, without pulses, and without lines in its spectrum.
 
-    It acts only while there are lines: then what it hands on is up to SIZE samples behind, and has
-    no DC. Windows lie at absolute indices, so any chunking gives the same samples.
+    It acts only while there are any. Beside lines, what it hands on is up to SIZE samples behind,
+    and has no DC. Windows lie at absolute indices, so any chunking gives the same samples.
 
     What misleads it: a burst with the spectrum of lines. The way back: RELEASE windows without one.
     """
@@ -36,6 +37,7 @@ class Excisor:
         self._found = np.zeros(N_LANES, np.int64)
         self._room = np.empty(N_LANES * STRIDE, np.complex64)
         self._raw = SampleStream(start, 1 << 16)
+        self._blanker = Blanker()
         self._is_active = False
         self._restart(start)
 
@@ -47,10 +49,12 @@ class Excisor:
     def push(self, samples: NDArray[np.complex64]) -> NDArray[np.complex64]:
         """Take the next samples `[n]`; returns those that are ready, valid until the next call."""
         self.counters["samples_bad"] += self._raw.append(samples)
+        self._ready = self._blanker.run(self._raw)
+        self.counters["pulses_blanked"] = self._blanker.n_pulses
         parts: list[NDArray[np.complex64]] = []
         while self._cut_lines(parts) if self._is_active else self._look(parts):
             pass
-        self._raw.forget_before(min(self._at, self._next))
+        self._raw.forget_before(min(self._at, self._next, self._blanker.next_index))
         return parts[0] if len(parts) == 1 else np.concatenate((*parts, np.empty(0, np.complex64)))
 
     def flush(self) -> NDArray[np.complex64]:
@@ -63,9 +67,11 @@ class Excisor:
             raise ValueError(f"gap: got {n} samples; allowed: 0 or more")
         end, at = self._raw.end, self._at
         rest = np.empty(0, np.complex64)
-        if self._is_active:
+        if at < end:
             rest = self.push(np.zeros(SIZE + STRIDE, np.complex64))[: end - at].copy()
-        elif end >= self._next + SIZE and self._has_lines((end - self._next - SIZE) // APART + 1):
+        self._blanker.end(self._raw)
+        n_windows = (end - self._next - SIZE) // APART + 1
+        if not self._is_active and n_windows > 0 and self._has_lines(n_windows):
             self._is_active, self._n_clean = True, 0
         self._restart(end + n)
         return rest
@@ -76,12 +82,13 @@ class Excisor:
         self._raw.restart(first)
         self._raw.append(np.zeros(index - first, np.complex64))
         self._memory.content.tail[:] = 0
-        self._at = index
+        self._blanker.restart(first)
+        self._at = self._ready = index
         self._next = first if self._is_active else first + 2 * STRIDE
 
     def _look(self, parts: list[NDArray[np.complex64]]) -> bool:
         """Hand on samples as they are, and look for lines; False: more samples are needed."""
-        end, last = self._raw.end, self._next + GROUP - APART + SIZE
+        end, last = self._ready, self._next + GROUP - APART + SIZE
         if end < last:
             if end > self._at:
                 parts.append(self._raw.view(self._at, end))
@@ -106,7 +113,7 @@ class Excisor:
 
     def _cut_lines(self, parts: list[NDArray[np.complex64]]) -> bool:
         """Take lines out of up to eight windows; False: more samples are needed."""
-        n = min((self._raw.end - self._next) // STRIDE - 1, N_LANES)
+        n = min((self._ready - self._next) // STRIDE - 1, N_LANES)
         if n < 1:
             return False
         x = self._raw.view(self._next, self._next + (n + 1) * STRIDE)

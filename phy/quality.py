@@ -71,6 +71,7 @@ COUNTERS = (
     "samples_bad",
     "windows_notched",
     "windows_not_notched",
+    "pulses_blanked",
     "gaps",
     "triggers",
     "preambles",

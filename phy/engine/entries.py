@@ -38,6 +38,8 @@ ENTRIES = {
     "sanitise": _entry("c8[1] f8", "i8"),
     "find_lines": _entry("c8[1] i8 i8 block u1[2]", "i8"),
     "cut_lines": _entry("c8[1] i8 block c8[1] u1[2] i8[1]"),
+    "blank": _entry("c8[1] i8 f8 f4[1] u1[1]", "f8"),
+    "find_pulses": _entry("c8[1] f4[1]", "i8"),
     "sense": _entry("c8[1] f8 f8 f8 f8[1]"),
     "decode_blocks": _entry("i2[1] i8 block block u1[1] u1[2]"),
     "encode_blocks": _entry("u1[2] block u1[2]"),

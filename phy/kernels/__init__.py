@@ -6,6 +6,7 @@ They run as a library that `phy.engine` builds. Only the build imports this pack
 from phy.kernels import bits, lanes
 from phy.kernels.acquisition import acquire, fold, settle
 from phy.kernels.argument_block import opener
+from phy.kernels.blanking import blank, find_pulses
 from phy.kernels.convolution import convolve
 from phy.kernels.decisions import expected_level
 from phy.kernels.demapper import axis_llrs
@@ -31,6 +32,7 @@ __all__ = [  # noqa: RUF022 (by use)
     # What the interpreter calls: `phy.engine.entries` has the types.
     "acquire",
     "add_noise",
+    "blank",
     "convolve",
     "cut_lines",
     "decode_blocks",
@@ -39,6 +41,7 @@ __all__ = [  # noqa: RUF022 (by use)
     "encode_blocks",
     "filter_strided",
     "find_lines",
+    "find_pulses",
     "interpolate",
     "learn_channel",
     "list_decode",

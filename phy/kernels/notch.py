@@ -4,8 +4,6 @@ A window is judged by itself, so that a line that sweeps through the band is fou
 Eight windows are transformed at once, one per lane; each gives the same whatever the others are.
 """
 
-import math
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -13,6 +11,7 @@ from numpy.typing import NDArray
 from phy.kernels.fft import transform, transpose
 from phy.kernels.inline import step
 from phy.kernels.lanes import Lanes, load, most, pairs, splat, store
+from phy.kernels.medians import median
 from phy.kernels.openers import open_notch
 from phy.sizes import N_LANES
 from phy.tables.block import PackedArguments
@@ -21,8 +20,6 @@ from phy.tables.notch import LINE_DB, MOST_CUT, SIZE, STRIDE, NotchMemory
 _LINE = 10 ** (LINE_DB / 10)
 # A window whose strongest bin has less than this times the mean of all has no line.
 _EVEN = 10.0
-# Steps of the search for the median between twice the mean and 100 dB less.
-_STEPS, _LEAST = 13, 1e-10
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -140,18 +137,7 @@ def _judge(lane: int, swapped: bool, memory: NotchMemory, cut: NDArray[np.uint8]
     for k in range(SIZE):
         a, b = re[N_LANES * k + lane], im[N_LANES * k + lane]
         power[k] = a * a + b * b
-    # Of each pair, the lower bound has at most half of the bins below it, the upper one more.
-    low, high = mean * _LEAST, 2.0 * mean
-    for _ in range(_STEPS):
-        middle, below = math.sqrt(low * high), 0
-        limit = np.float32(middle)
-        for k in range(SIZE):
-            below += power[k] < limit
-        if below > SIZE // 2:
-            high = middle
-        else:
-            low = middle
-    limit, n = np.float32(_LINE * math.sqrt(low * high)), 0
+    limit, n = np.float32(_LINE * median(power, mean)), 0
     for k in range(SIZE):
         if power[k] > limit:
             cut[k] = cut[(k + 1) % SIZE] = cut[k - 1] = 1

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from phy.reference.blanking import blank, find_pulses
 from phy.reference.notch import cut_lines, find_lines
 from phy.sizes import NOISE_CHUNK, SENSE_WINDOW
 from phy.tables.sensing import (
@@ -170,11 +171,13 @@ def sanitise(x: NDArray[np.complex64], limit: float) -> int:
     return int(len(x) - good.sum())
 
 
-KERNELS: dict[str, Callable[..., int | None]] = {
+KERNELS: dict[str, Callable[..., float | None]] = {
     "add_noise": add_noise,
+    "blank": blank,
     "filter_strided": filter_strided,
     "cut_lines": cut_lines,
     "find_lines": find_lines,
+    "find_pulses": find_pulses,
     "interpolate": interpolate,
     "sanitise": sanitise,
     "sense": sense,

@@ -1,4 +1,4 @@
-"""Lines in the spectrum are cut, nothing else is; and the receiver knows what was cut."""
+"""Lines and pulses are cut, nothing else is; and the receiver knows which lines were cut."""
 
 import numpy as np
 import pytest
@@ -8,11 +8,13 @@ from hypothesis import strategies as st
 from phy import (
     GRIDS,
     MCS_TABLE,
+    N_PULSE,
     OFDM_64_16,
     EnergyDetector,
     Excisor,
     Jammer,
     Transmitter,
+    pulse,
     reference,
 )
 from phy.engine import in_use
@@ -20,8 +22,9 @@ from phy.testing import compute, new_notch_memory, notch_tables
 from tests.phy.signals import heard, noise, noisy, payloads, silence
 
 SIZE, STRIDE = notch_tables.SIZE, notch_tables.STRIDE
+BLOCK = 64
 RATE_HZ = 1e6
-SETTLED = 12_000
+SETTLED = 20_000
 """Samples after which a line that stays is cut."""
 GRID = OFDM_64_16
 SEED = 47
@@ -110,7 +113,9 @@ def test_any_chunking_gives_the_same_samples(seed, cuts, gap):
     rng = np.random.default_rng(seed)
     settings = {"times": [(0.002, 0.02), (0.055, 0.058)], "offset_hz": rng.uniform(-4e5, 4e5)}
     jammer = Jammer("tone", rng.uniform(0, 40), RATE_HZ, seed, **settings)
+    pulses = Jammer("pulses", 25, RATE_HZ, seed, period_s=rng.uniform(3e-4, 3e-3), duty=0.01)
     x = jammer.add(noise(rng, 60_000, 0.1) + np.complex64(rng.uniform(0, 2)), 0)
+    x[30_000:] = pulses.add(x[30_000:], 30_000)
     late = jammer.add(noise(rng, 10_000, 0.1), len(x) + gap)
     whole, parts = Excisor(), Excisor()
     at_once = (whole.push(x).copy(), whole.gap(gap), whole.push(late).copy(), whole.flush())
@@ -168,6 +173,59 @@ def test_a_robot_that_listens_for_moments_finds_lines(rng):
     assert np.mean(np.abs(heard_of_it[STRIDE:-STRIDE]) ** 2) < 1.5
 
 
+@pytest.mark.parametrize("power_db", [17, 27, 60])
+@pytest.mark.parametrize("period_s", [1e-3, 1.024e-3, 3.84e-4])
+def test_beside_pulses_bursts_are_heard(rng, power_db, period_s):
+    pdus, x = a_stream(rng, 10, 64, 1, 15)
+    x = jammed(rng, x, "pulses", power_db, period_s=period_s, duty=2e-5 / period_s)
+    assert received(x, in_use().receiver()) == pdus
+    assert len(heard(in_use().receiver().push(x))) < 9
+
+
+@pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
+def test_bursts_and_our_own_pulses_are_no_pulses(rng, grid):
+    """Each block is looked at, not only those that an excisor without pulses looks at."""
+    for mcs in MCS_TABLE:
+        _, x = a_stream(rng, 1, 400, mcs.index, 40, grid)
+        x[200 : 200 + N_PULSE] += pulse()
+        assert not blanked(x)
+
+
+def test_the_noise_of_a_coarse_converter_is_no_pulse(rng):
+    """Its samples are mostly 0, the others a step; a burst stands out of it like any other."""
+    for level in (0.02, 0.1, 0.3, 1):
+        _, x = a_stream(rng, 1, 400, 1, 40)
+        x = (
+            np.round(x.view(np.float32) * 4 + level * rng.standard_normal(2 * len(x))) / 128
+        ).astype(np.float32)
+        assert not blanked(x.view(np.complex64))
+
+
+def blanked(x):
+    """Number of blocks of `x` in which there is a pulse."""
+    n, found = len(x) // BLOCK - 1, np.zeros(len(x) // BLOCK, np.uint8)
+    compute.blank(x.copy(), n, 0.0, np.empty(BLOCK, np.float32), found)
+    return found.sum()
+
+
+def test_when_the_pulses_end_all_is_left_again(rng):
+    x, excisor = noise(rng, 90_000, 0.1), Excisor()
+    pulses = Jammer("pulses", 30, RATE_HZ, 1, period_s=1e-3, times=[(0, 0.03)])
+    out = through(pulses.add(x, 0), excisor)
+    assert np.array_equal(out[30_000:], x[30_000:])
+    assert 20 < excisor.counters["pulses_blanked"] <= 2 * 30
+    # Nothing waits any more.
+    assert len(excisor.push(x)) == len(x)
+
+
+def test_beside_pulses_the_channel_is_idle(rng):
+    x = Jammer("pulses", 20, RATE_HZ, 1, period_s=1e-3).add(noise(rng, 200_000), 0)
+    sense, excisor = EnergyDetector(), Excisor()
+    for each in np.split(x, 10):
+        sense.push(excisor.push(each))
+    assert sense.busy_until < 20_000
+
+
 def test_the_reference_cuts_the_same(rng):
     x = noise(rng, 9 * STRIDE, 0.1) + np.complex64(1)
     x = Jammer("narrow", 20, RATE_HZ, 1, offset_hz=1e5, width_hz=3e4).add(x, 0)
@@ -181,6 +239,21 @@ def test_the_reference_cuts_the_same(rng):
     for a, b in zip(*made, strict=True):
         assert np.allclose(a, b, atol=1e-4)
     assert made[0][1].any()
+
+
+def test_the_reference_blanks_the_same(rng):
+    x = noise(rng, 17 * BLOCK, 0.1)
+    x[200:220] += 5 * noise(rng, 20)
+    x[319] += 30
+    made, power = [], np.empty(BLOCK, np.float32)
+    for kernels in (vars(reference)["KERNELS"], in_use().kernels):
+        out, found = x.copy(), np.zeros(9, np.uint8)
+        level = kernels["blank"](out, 9, 0.01, power, found)
+        pulses = [kernels["find_pulses"](x[n : n + 8 * BLOCK], power) for n in (0, 9 * BLOCK)]
+        made.append((out, found, round(level, 3), pulses))
+    for a, b in zip(*made, strict=True):
+        assert np.array_equal(a, b)
+    assert made[0][1].sum() == 2
 
 
 def test_what_was_cut_is_known_by_subcarrier(rng):
