@@ -59,6 +59,8 @@ _JAMMED = (
 _JAMMED_HZ, _SETTLED, _AT_ONCE = 1e6, 20_000, 10
 _DUTY, _PERIOD_S = 0.02, {"tone": 1.0, "narrow": 1.0, "sweep": 0.01, "pulses": 0.001}
 _LIQUID_FRAMES, _LIQUID_PPM = 300, 1.0
+_HEADER = 600
+"""Samples of a burst after which it is surely in its payload."""
 _PATIENCE_S = 0.04
 """As the modem of a daemon has it."""
 
@@ -87,6 +89,10 @@ def _rows(seed: int, quick: bool) -> Iterator[Row]:
     for jammed in _JAMMED:
         yield _beside(jammed, seed, quick)
     yield _penalty(seed, quick)
+    for mcs, louder_db, target in ((QPSK12, 10, 0.97), (QAM64_34, 20, 0.9)):
+        yield _second_burst(mcs, louder_db, target, seed, quick)
+    for louder_db in (0, -6):
+        yield _after_truncated(louder_db, seed, quick)
     yield _busy_beside_a_tone(seed)
     for step_db in (-3.0, -6.0):
         yield _step(step_db, seed, quick)
@@ -245,6 +251,44 @@ def _busy_beside_a_tone(seed: int) -> Row:
         busy += n >= 50 and sense.busy_until > sense.next_index - len(block)
     note = "tone 20 dB above the noise's power, blocks of 1 ms"
     return Row("cw_busy_share", busy / 1950, "share", 0.02, "less", 1950, note=note)
+
+
+def _second_burst(mcs: int, louder_db: int, target: float, seed: int, quick: bool) -> Row:
+    """Bursts that begin anywhere in the payload of another one, and are louder."""
+    rng, transmitter = np.random.default_rng(seed), Transmitter()
+    n, heard = 100 if quick else 1000, 0
+    for _ in range(n):
+        first = transmitter.modulate([rng.bytes(220) for _ in range(4)], mcs)
+        pdu = rng.bytes(220)
+        second = transmitter.modulate([pdu], mcs) * 10 ** (louder_db / 20)
+        turn = 2j * np.pi * (rng.uniform(-0.01, 0.01) * np.arange(len(second)) + rng.random())
+        at = int(rng.integers(_HEADER, len(first)))
+        x = np.pad(first, (800, max(0, at + len(second) - len(first)) + 1500)).astype(np.complex64)
+        x[800 + at : 800 + at + len(second)] += second * np.exp(turn)
+        heard += pdu in _heard(Receiver(), x + _noise(rng, len(x), 10 ** (-SNR_DB / 10)))
+    name = f"second_burst_heard_mcs{mcs}_{louder_db}db"
+    return _heard_share(name, heard, n, target, "220 B in 4 x 220 B, 25 dB", quick)
+
+
+def _after_truncated(louder_db: int, seed: int, quick: bool) -> Row:
+    """Bursts right behind one that stops anywhere in its payload."""
+    rng, transmitter = np.random.default_rng(seed), Transmitter()
+    n, heard = 100 if quick else 1000, 0
+    for _ in range(n):
+        first = transmitter.modulate([rng.bytes(220) for _ in range(4)], QPSK12)
+        pdu = rng.bytes(220)
+        second = transmitter.modulate([pdu], QPSK12) * np.float32(10 ** (louder_db / 20))
+        cut = int(rng.integers(_HEADER, len(first)))
+        x = np.pad(np.concatenate((first[:cut], second)), (800, 1500))
+        heard += pdu in _heard(Receiver(), x + _noise(rng, len(x), 10 ** (-SNR_DB / 10)))
+    name = f"after_truncated_heard_{louder_db}db"
+    return _heard_share(name, heard, n, 0.97, "220 B behind a part of 4 x 220 B, 25 dB", quick)
+
+
+def _heard_share(name: str, heard: int, n: int, target: float, note: str, quick: bool) -> Row:
+    """The share heard, of which the lower 95 % bound has to meet the target."""
+    value = heard / n if quick else 1 - ErrorRate(n, n - heard).bound
+    return Row(name, value, "share", target, "more", n, note=f"{heard} of {n} heard; {note}")
 
 
 def _step(step_db: float, seed: int, quick: bool) -> Row:

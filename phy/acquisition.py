@@ -85,11 +85,21 @@ class Acquisition:
         self._channel = new_channel(grid)
         self._scratch = new_scratch(grid)
         self._room = _new_room(grid)
+        self._n_marked = 0
 
-    @property
-    def kept(self) -> NDArray[np.float32]:
-        """0 for subcarriers to leave out, by symbols of the header or payload `[n, width]`."""
-        return self._channel.content.kept
+    def leave_out(self, kept: NDArray[np.float32] | None) -> None:
+        """Leave subcarriers out of the next symbols that are 0 in `kept` `[n, n_used]`."""
+        rows = self._channel.content.kept
+        rows[: self._n_marked] = 1
+        self._n_marked = 0
+        if kept is not None:
+            self._n_marked = len(kept)
+            rows[: self._n_marked, : self._grid.n_used] = kept[:, self._grid.tones]
+
+    def leave_out_always(self, kept: NDArray[np.float32] | None) -> None:
+        """Leave subcarriers out of training and header that are 0 in any row of `kept`."""
+        n = header.n_symbols(self._grid)
+        self.leave_out(None if kept is None else np.tile(kept.min(0), (n, 1)))
 
     def acquire(
         self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex

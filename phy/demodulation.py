@@ -39,22 +39,23 @@ class Demodulator:
         llr: NDArray[np.int16],
         powers: NDArray[np.float32],
         points: NDArray[np.complex64] | None = None,
-    ) -> None:
+    ) -> float:
         """Write the LLRs of OFDM symbols, in the code's order, to `llr` `[n · n_data · bits]`.
 
         The first symbol's FFT window begins with `samples`. They have rotated by `frequency` cycles
         per sample, starting `origin` samples earlier. The header's first symbol is number 0.
         `channel` is updated. `powers` `[≥ n]` gets each symbol's mean power on a subcarrier;
-        `points` `[n, n_data]`, if given, gets the equalised points.
+        `points` `[n, n_data]`, if given, gets the equalised points. Returns the largest power.
         """
         grid = self._grid
         n = (len(samples) - grid.n_fft) // grid.n_symbol + 1
         to = self._no_points if points is None else points
-        compute.demodulate(
+        loudest: float = compute.demodulate(
             samples, n, frequency, dc, origin, first_symbol,
             tones(grid), axes(modulation, grid), channel, self._scratch,
             to, llr, powers,
         )  # fmt: skip
+        return loudest
 
 
 class PduDecoder:

@@ -45,7 +45,7 @@ class BurstOver(NamedTuple):
     """The end of a burst whose header was read.
 
     `ending`: "whole", or why it ended early: "faded" (its power vanished), "cut" (samples are
-    missing), "foreign" (another network's: not decoded).
+    missing), "foreign" (another network's: not decoded), "displaced" (two others began in it).
     """
 
     burst: BurstQuality
@@ -82,6 +82,9 @@ COUNTERS = (
     "bursts_foreign",
     "bursts_faded",
     "bursts_cut",
+    "bursts_displaced",
+    "captures",
+    "samples_searched_again",
     "pdus_good",
     "pdus_bad",
 )

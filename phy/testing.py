@@ -4,7 +4,7 @@ The inside of `phy` may change as long as these names keep their meaning. `phy.k
 `phy.reference`, which the tests compare, have doors of their own.
 """
 
-from phy import compute, convolutional, crc, ldpc, preamble, states
+from phy import compute, convolutional, crc, ldpc, preamble
 from phy.acquisition import Acquisition, Missed
 from phy.channel.fading import BLOCK as FADING_BLOCK
 from phy.channel.fading import jakes, moving_filter
@@ -80,7 +80,6 @@ __all__ = [  # noqa: RUF022 (by stage)
     "to_tones",
     "whitening",
     # The search for bursts.
-    "states",
     "DC_IMAG",
     "DC_REAL",
     "FLOOR",

@@ -32,16 +32,17 @@ def demodulate(
     points: NDArray[np.complex64],
     llr: NDArray[np.int16],
     powers: NDArray[np.float32],
-) -> None:
+) -> float:
     """Write the LLRs of `n` symbols, the first of whose FFT windows begins at `samples[0]`.
 
-    `powers` `[≥ n]` gets each symbol's mean power on a tone. For the other arguments see
-    `windows_to_tones` and `equalise`.
+    `powers` `[≥ n]` gets each symbol's mean power on a tone; the largest is returned. For the
+    other arguments see `windows_to_tones` and `equalise`.
     """
     tones, axes = open_tones(tones_in), open_axes(axes_in)
     channel, scratch = open_channel(channel_in), open_scratch(scratch_in)
     starts, width, y = scratch.starts, scratch.y.shape[2], scratch.y
     circle(-frequency, tones.gain, scratch.turn)
+    loudest = 0.0
     for row in range(0, n, N_LANES):
         rows = min(n - row, N_LANES)
         for i in range(rows):
@@ -52,7 +53,9 @@ def demodulate(
             for k in range(2 * width * i, 2 * width * (i + 1), N_LANES):
                 power = power + load(y, k) * load(y, k)
             powers[row + i] = total(power) / tones.bins.size
+            loudest = max(loudest, float(powers[row + i]))
         equalise(y, rows, number + row, tones, axes, channel, scratch, points, llr, row)
+    return loudest
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

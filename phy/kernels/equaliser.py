@@ -21,6 +21,7 @@ from phy.tables.burst import (
     GAIN,
     MOVES,
     N_HEARD,
+    N_ODD,
     NO,
     PHASE,
     SLOPE,
@@ -35,6 +36,8 @@ from phy.tables.burst import (
 
 NO_STEP = 4.0
 """Times the noise by which data may be off behind a step of gain; else others are on the air."""
+# With less trust than this, a symbol is of another burst.
+_ODD = 0.25
 # With less certainty than this in the symbols since the last correction, there is none.
 _LEAST_MASS = 1 / 16
 # Noise floor relative to the signal: echoes and converters always leave this share.
@@ -289,6 +292,7 @@ def equalise(
             if off > NO_STEP:
                 no = off * _noise(channel)
                 trust, belief = 1 / off, _noise(channel) / (no + figures[DOUBT])
+        figures[N_ODD] = figures[N_ODD] + 1 if trust < _ODD else 0
         certain, wrong = _data(re, im, kept, c, s, trust, belief, axes, channel, scratch, n_data)
         if points.shape[0]:
             for d in range(n_data):

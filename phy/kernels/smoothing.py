@@ -27,6 +27,7 @@ from phy.tables.burst import (
     DUE,
     MOVES,
     N_FOLLOWED,
+    N_ODD,
     NO,
     PHASE,
     SCALED,
@@ -179,7 +180,7 @@ def start(tones: Tones, channel: Channel) -> None:
     stand_still(channel)
     figures, unknown = channel.figures, channel.unknown
     figures[SPREAD], figures[SCALED], figures[MOVES] = 0, 1, 1
-    figures[TURNS] = figures[N_FOLLOWED] = 0
+    figures[TURNS] = figures[N_FOLLOWED] = figures[N_ODD] = 0
     for group in range(channel.power.size):
         speed = _SPEED * channel.power[group]
         unknown[0, group] += _OLD * _OLD * speed

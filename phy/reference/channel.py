@@ -53,6 +53,8 @@ class Channel:
     """The sum over symbols of the squared turn of echoes in a symbol, in rad²."""
     n_followed: int = 0
     """The number of these symbols."""
+    n_odd: int = 0
+    """The number of symbols, up to the last, that were of another burst, by their pilots."""
     due: int = LONGEST
     """The number of symbols from one correction to the next."""
 

@@ -17,6 +17,8 @@ from phy.sequences import polarity
 
 NO_STEP = 4.0
 """Times the noise by which data may be off behind a step of gain; else others are on the air."""
+ODD = 0.25
+"""A symbol is of another burst if the noise of the preamble is less than this share of its own."""
 LEAST_MASS = 1 / 16
 """With less certainty in the symbols since the last correction of the channel, there is none."""
 
@@ -85,6 +87,8 @@ class Equaliser:
             tracked = Tracked(each, row, shown.no, self.tracking.angle, sign)
             if shown.amplitude != 1:
                 tracked = self._examined(tracked, modulation)
+            is_odd = self.channel.noise < ODD * tracked.no
+            self.channel.n_odd = self.channel.n_odd + 1 if is_odd else 0
             waiting.append(tracked)
             if self._n_heard + len(waiting) >= self.channel.due:
                 parts += self._equalise(waiting, modulation)

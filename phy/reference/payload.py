@@ -18,6 +18,12 @@ SLIP_EVERY = 256
 """Interval in symbols at which the FFT windows are aligned to the sender's clock."""
 SEEMING = 5e-6
 """Squared turn in rad² that phase noise and clocks make still echoes seem to have in a symbol."""
+LOUD = 2.0
+"""A symbol with so many times the burst's power has another burst in it."""
+MOST_ODD = 2
+"""So many symbols at the end of a burst may be of another one before the search looks there."""
+BACK = 511
+"""A good PDU may outlive the begin of another burst in so many of its last samples."""
 FADED = 0.25
 """A burst is gone if a PDU fails with less than this share of the burst's power above noise."""
 
@@ -26,16 +32,21 @@ class Payload:
     """Takes the symbols of a burst's payload, and decodes each PDU after its last one."""
 
     def __init__(
-        self, acquired: Acquired, plan: BurstLayout, grid: Numerology, n_header: int
+        self, acquired: Acquired, plan: BurstLayout, grid: Numerology, n_header: int, dc: complex
     ) -> None:
         self.acquired = acquired
         self.plan = plan
         self.n_symbols_in = self.n_good = self.n_bad = 0
         self._grid = grid
         self._n_header = n_header
+        # What the search takes for DC from now on may be of another burst.
+        self._dc = dc
         self._window = acquired.window
         self._llr = np.zeros(0, np.int16)
         self._powers: list[float] = []
+        self.judged = acquired.window
+        channel = acquired.equaliser.channel
+        self._level = channel.gain + channel.no
 
     @property
     def n_done(self) -> int:
@@ -50,15 +61,23 @@ class Payload:
         """Absolute index after the FFTs of the first `n` symbols."""
         return self.window(n) - self._grid.n_cp
 
-    def n_through(self, end: int) -> int:
-        """How many symbols can be taken when the stream reaches index `end`.
+    @property
+    def need(self) -> int:
+        """The index that the stream must reach before the next PDU is in, or the windows slip."""
+        return self.end_of(self._next)
 
-        At most those that complete the next PDU, and those before the windows slip.
-        """
-        plan, first = self.plan, self.n_symbols_in
-        arrived = (end - self.end_of(0)) // self._grid.n_symbol
+    @property
+    def _next(self) -> int:
+        first = self.n_symbols_in
         limit = first - first % SLIP_EVERY + SLIP_EVERY
-        return min(arrived, plan.symbols_through(self.n_done + 1), limit) - first
+        return min(self.plan.symbols_through(self.n_done + 1), limit)
+
+    def take_next(
+        self, stream: NDArray[np.complex64], start: int, cuts: Cuts | None
+    ) -> Subcarriers:
+        """Process the symbols up to `need` of a stream from index `start` on."""
+        x = stream[self.window(self.n_symbols_in) - start : self.need - start]
+        return self.take(x, self._dc, self._next - self.n_symbols_in, cuts)
 
     def take(
         self, samples: NDArray[np.complex64], dc: complex, n: int, cuts: Cuts | None = None
@@ -102,15 +121,25 @@ class Payload:
         turns = channel.turns / max(1, channel.n_followed) - SEEMING
         return math.sqrt(max(0.0, turns)) / (2 * math.pi * self._grid.n_symbol)
 
-    def is_gone(self) -> bool:
-        """Whether the symbols since the last PDU lacked the power of a burst."""
-        channel = self.acquired.equaliser.channel
-        powers = self._powers
-        return bool(powers) and float(np.mean(powers)) < channel.no + FADED * channel.gain
+    def count(self) -> tuple[bytes | None, bool, int]:
+        """Decode the PDU that is in, and count it.
 
-    def count_powers_anew(self) -> None:
-        """Start to measure the power of symbols for the next PDU."""
+        Returns the PDU, if its CRC-32 is right; whether the power of a burst was lacking; and the
+        index before which nothing tells of another burst in it.
+        """
+        channel, powers = self.acquired.equaliser.channel, np.array(self._powers)
+        data = self.decode()
+        end = plain_until = self.end_of(self.n_symbols_in)
+        is_last = self.n_done == self.plan.n_pdus
+        loud = np.flatnonzero(powers > LOUD * self._level)
+        if len(loud):
+            plain_until = self.end_of(self.n_symbols_in - len(powers) + int(loud[0]) - 1)
+        if is_last and channel.n_odd > MOST_ODD:
+            plain_until = min(plain_until, end - BACK)
+        lacks_power = len(powers) > 0 and bool(powers.mean() < channel.no + FADED * channel.gain)
         self._powers = []
+        self.judged = end
+        return data, lacks_power and not is_last, plain_until
 
     def slip(self) -> None:
         """Align the windows to the sender's clock every 256 symbols, by the slope over subcarriers.

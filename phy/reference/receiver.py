@@ -22,11 +22,13 @@ from phy.quality import BurstOver, Claim, Event, PduHeard
 from phy.reference.acquisition import Acquisition, Missed, before, needed_after
 from phy.reference.detection import HISTORY, HOP, Detector
 from phy.reference.offset import BACKOFF
-from phy.reference.payload import Payload
+from phy.reference.payload import BACK, Payload
 from phy.screening import Screening
 
 ALIGN_SPAN = preamble.SHORT
 """Number of samples from the first crossing on in which the peak must lie."""
+MOST_BURSTS = 2
+"""A burst that begins in another one is received beside it; a third takes the worse one's place."""
 RETRY_AFTER = 16
 """Number of samples after a false alarm at which the search continues."""
 LARGEST_SAMPLE = 1e6
@@ -70,7 +72,9 @@ class Receiver:
         self._span = before(grid) + needed_after(grid)
         # Number of samples before the search position that acquisition and detection need.
         self._kept = before(grid) + preamble.SHORT + HISTORY
-        self._burst: Payload | None = None
+        # Bursts in progress, by the order of their headers; good PDUs that the search leaves out.
+        self._bursts: list[Payload] = []
+        self._explained: list[tuple[int, int]] = []
         self._crossing: int | None = None
         self._peak: tuple[int, float] | None = None
         self.claim = Claim(start, start)
@@ -97,7 +101,8 @@ class Receiver:
         while self._step(events):
             pass
         # Samples long before the search position are no longer needed.
-        n_old = max(0, self._at - self._kept - self._first)
+        needed = [burst.window(burst.n_symbols_in) for burst in self._bursts]
+        n_old = max(0, min([self._at - self._kept, *needed]) - self._first)
         self._samples, self._first = self._samples[n_old:], self._first + n_old
         return events
 
@@ -108,8 +113,8 @@ class Receiver:
         self.counters["gaps"] += 1
         end = self.next_index
         events: list[Event] = []
-        if self._burst is not None:
-            self._end(self._burst, events, "cut")
+        if self._bursts:
+            self._cut(events)
         elif end > self._at:
             events = self.flush()
         self._begin(end + n)
@@ -124,13 +129,17 @@ class Receiver:
         self.counters["samples"] = counted
         # Silence that nobody received tells nothing of the noise.
         self._detector = known
-        if self._burst is not None:
-            self._end(self._burst, events, "cut")
+        self._cut(events)
         return events
+
+    def _cut(self, events: list[Event]) -> None:
+        while self._bursts:
+            self._end(self._bursts[0], events, "cut")
 
     def _begin(self, index: int) -> None:
         """Start the search at `index`, with silence before it."""
         self._crossing = self._peak = None
+        self._explained = []
         self._samples = np.zeros(self._kept, np.complex64)
         self._first = index - self._kept
         self._at = self._began = index
@@ -142,27 +151,47 @@ class Receiver:
         return self._samples[first - self._first : last - self._first]
 
     def _step(self, events: list[Event]) -> bool:
-        """Advance by one step; returns False if samples for it are missing."""
-        if self._burst is not None:
-            return self._payload(self._burst, events)
+        """Take the step that needs the fewest samples; returns False if they are missing."""
+        burst = min(self._bursts, key=lambda each: each.need, default=None)
         if self._peak is not None:
-            return self._acquire(*self._peak, events)
-        if self._crossing is not None:
-            return self._align(self._crossing)
-        return self._search()
+            needed = self._peak[0] - self._before + self._span
+            if burst is None or needed <= burst.need:
+                return self._acquire(*self._peak, events)
+        elif self._crossing is not None:
+            if burst is None or self._crossing + ALIGN_SPAN <= burst.need:
+                return self._align(self._crossing)
+        elif self._search():
+            return True
+        return burst is not None and self._payload(burst, events)
 
     def _search(self) -> bool:
         """Search a hop for the first sample above the threshold."""
+        # The bound moves the position, too.
+        if self._searchable() < self._at + HOP:
+            return False
         x = self._view(self._at - HISTORY, self._at + HOP)
         if x is None:
             return False
+        begin = self._at
         self._crossing = self._detector.crossing(x, self._at)
         if self._crossing is None:
             self._at += HOP
         else:
             self.counters["triggers"] += 1
             self._at = self._crossing
+        if self._bursts:
+            self.counters["samples_searched_again"] += self._at - begin
         return True
+
+    def _searchable(self) -> int:
+        """The index before which all is there to search: what no good PDU explains."""
+        while self._explained:
+            begin, end = self._explained[0]
+            if self._at + HOP <= begin:
+                return begin
+            self._at = max(self._at, end)
+            self._explained.pop(0)
+        return self._bursts[-1].judged if self._bursts else self.next_index
 
     def _align(self, crossing: int) -> bool:
         """Find the metric's maximum within a short training's length of the crossing."""
@@ -215,14 +244,23 @@ class Receiver:
             self._screening.missed()
             self._pass_by(peak, "headers_refused")
             return True
-        self._burst = burst = Payload(found, plan, self._grid, n_symbols(self._grid))
-        self.claim = self._screening.claim(found.quality, burst.end_of(plan.n_symbols) + BACKOFF)
+        burst = Payload(found, plan, self._grid, n_symbols(self._grid), self._detector.dc)
+        claim = self._screening.claim(found.quality, burst.end_of(plan.n_symbols) + BACKOFF)
+        if not self._bursts or claim.end > self.claim.end:
+            self.claim = claim
         if self._screening.is_foreign(told):
             # The search continues in the burst: a false header must not make the receiver deaf.
-            self._end(burst, events, "foreign")
-        else:
-            self.counters["bursts"] += 1
-            self._at = found.window
+            self.counters["bursts_foreign"] += 1
+            self._screening.missed()
+            events.append(BurstOver(found.quality, 0, "foreign"))
+            self._at = burst.end_of(0)
+            return True
+        self.counters["bursts"] += 1
+        self.counters["captures"] += len(self._bursts) > 0
+        if len(self._bursts) == MOST_BURSTS:
+            self._end(min(self._bursts, key=lambda each: each.n_good), events, "displaced")
+        self._bursts.append(burst)
+        self._at = found.window
         return True
 
     def _pass_by(self, peak: int, counter: str) -> None:
@@ -231,46 +269,43 @@ class Receiver:
         self._at = peak + RETRY_AFTER
 
     def _payload(self, burst: Payload, events: list[Event]) -> bool:
-        """Process the symbols that have come, up to the end of a PDU, and report that PDU."""
-        n = burst.n_through(self.next_index)
-        if n < 1:
+        """Process the symbols up to the end of a PDU, and report that PDU."""
+        if self.next_index < burst.need:
             return False
-        first, last = burst.n_symbols_in, burst.n_symbols_in + n
-        x = self._view(burst.window(first), burst.end_of(last))
-        if x is None:
-            return False
-        points = burst.take(x, self._detector.dc, n, self.cuts)
+        points = burst.take_next(self._samples, self._first, self.cuts)
         if self._on_points is not None:
             self._on_points(points.astype(np.complex64), burst.plan.mcs.modulation)
-        self._at = burst.end_of(last)
-        while burst.is_next_in():
-            data = burst.decode()
+        lacks_power = False
+        while burst.is_next_in() and not lacks_power:
+            begin = burst.judged
+            data, lacks_power, plain_until = burst.count()
+            is_last = burst.n_done == burst.plan.n_pdus
             if data is not None:
                 self.counters["pdus_good"] += 1
-                at = burst.end_of(last) + BACKOFF
-                doppler = burst.doppler if burst.n_done == burst.plan.n_pdus else None
+                at, doppler = burst.judged + BACKOFF, burst.doppler if is_last else None
                 events.append(PduHeard(data, burst.n_done - 1, at, burst.acquired.quality, doppler))
+                lacks_power = False
+                # It may have outlived the begin of another burst; if so, the next one will not.
+                until = burst.judged if is_last else max(begin, burst.judged - BACK)
+                if min(until, plain_until) >= begin:
+                    self._explained.append((begin, min(until, plain_until)))
             else:
                 self.counters["pdus_bad"] += 1
-                if burst.n_done < burst.plan.n_pdus and burst.is_gone():
-                    self._end(burst, events, "faded")
-                    return True
-            burst.count_powers_anew()
         if burst.n_done == burst.plan.n_pdus:
             self._end(burst, events, "whole")
+        elif lacks_power:
+            self._end(burst, events, "faded")
         else:
             burst.slip()
         return True
 
     def _end(self, burst: Payload, events: list[Event], ending: str) -> None:
-        """End the burst, and continue the search after the part that was processed."""
-        self._burst = None
+        """End a burst; the search goes on behind what its good PDUs explain."""
+        self._bursts.remove(burst)
         if ending != "whole":
             self.counters[f"bursts_{ending}"] += 1
-        if ending == "faded":
-            end = burst.end_of(burst.n_symbols_in) + BACKOFF
-            self.claim = self._screening.claim(burst.acquired.quality, end)
+        if ending == "faded" and not self._bursts:
+            self.claim = self._screening.claim(burst.acquired.quality, burst.judged + BACKOFF)
         if not burst.n_good:
             self._screening.missed()
         events.append(BurstOver(burst.acquired.quality, burst.n_good, ending))
-        self._at = burst.end_of(burst.n_symbols_in)

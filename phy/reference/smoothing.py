@@ -113,7 +113,7 @@ def start(channel: Channel, grid: Numerology) -> None:
     speed = SPEED * channel.power
     channel.unknown = np.array([channel.unknown[0] + OLD**2 * speed, OLD * speed, speed])
     channel.moves, channel.speed = True, np.zeros(grid.n_used, np.complex128)
-    channel.turns, channel.n_followed = 0.0, 0
+    channel.turns, channel.n_followed, channel.n_odd = 0.0, 0, 0
     sum_doubt(channel, grid)
     channel.due = _next(channel.no, channel, grid)
 

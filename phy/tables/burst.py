@@ -103,10 +103,10 @@ class Channel(NamedTuple):
 PHASE, SLOPE = 0, 1
 """Rows of `tracking`: the phase common to all tones, and its slope over them."""
 
-N_FIGURES = 15
+N_FIGURES = 16
 (
     NO, GAIN, DELAY, DRIFT, N_HEARD, CERTAIN, WRONG, SLOPE_USED, DOUBT, DUE, MOVES, SPREAD, SCALED,
-    TURNS, N_FOLLOWED,
+    TURNS, N_FOLLOWED, N_ODD,
 ) = range(N_FIGURES)  # fmt: skip
 """Of `figures`: noise on a subcarrier, mean |h|², phase a subcarrier, drift; symbols since a
 correction, what was certain in them, Σ |E s|², and what was not, Σ |h|² (E|s|² − |E s|²); the slope

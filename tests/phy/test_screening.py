@@ -78,9 +78,8 @@ def test_headers_that_this_link_never_sends_cost_nothing(name):
     receiver = phy.Receiver(expected=EXPECTED)
     assert heard(receiver, x) == sent
     assert receiver.counters["headers_refused"] >= 85
-    believes = phy.Receiver()
-    if "long" in name:
-        assert len(heard(believes, x)) < 0.5 * len(sent), "who believes them is deaf"
+    # Who believes them looks into what they claim, nevertheless.
+    assert len(set(heard(phy.Receiver(), x)) & set(sent)) >= 0.9 * len(sent)
 
 
 def test_the_claim_is_within_the_longest_burst_for_other_networks_too():
