@@ -26,7 +26,7 @@ from phy.sizes import N_PULSE, SENSE_WINDOW
 if TYPE_CHECKING:
     from phy.channel import PROFILES, FrontEnd, FrontEndParams, Jammer, Path, PathParams
     from phy.engine import Engine, EngineError
-    from phy.excisor import Excisor
+    from phy.excisor import Excisor, Line
     from phy.oversampling import REACH, Downsampler, upsample
     from phy.pulses import pulse
     from phy.receiver import Receiver
@@ -62,6 +62,7 @@ __all__ = [
     "FrontEnd",
     "FrontEndParams",
     "Jammer",
+    "Line",
     "Mcs",
     "Modulation",
     "Numerology",
@@ -85,7 +86,7 @@ __all__ = [
 _LATER = {
     "phy.channel": ("PROFILES", "FrontEnd", "FrontEndParams", "Jammer", "Path", "PathParams"),
     "phy.engine": ("Engine", "EngineError"),
-    "phy.excisor": ("Excisor",),
+    "phy.excisor": ("Excisor", "Line"),
     "phy.oversampling": ("REACH", "Downsampler", "upsample"),
     "phy.pulses": ("pulse",),
     "phy.sensing": ("EnergyDetector",),

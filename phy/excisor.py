@@ -1,6 +1,9 @@
 """Takes lines and pulses out of a stream before the search: tones, sweeps, ignition, radars."""
 
+import math
 from collections import Counter
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +14,27 @@ from phy.cuts import Cuts
 from phy.sizes import N_LANES
 from phy.stream import SampleStream
 from phy.tables.notch import SIZE, STRIDE, new_notch_memory
+from phy.tables.sensing import LEAST_FLOOR
 
 APART = 4 * SIZE
 """While there are no lines, one window in so many samples is looked at."""
 GROUP = N_LANES * APART
 """They are looked at in groups: a line is found after about so many samples."""
+LOOK_EVERY = 16
+"""What is told of lines is of one window in so many."""
 RELEASE = 64
 """Number of windows without a line, one after another, after which all is left as it is."""
+
+
+class Line(NamedTuple):
+    """A tone or narrow signal that was cut: its middle in cycles per sample, and its power."""
+
+    frequency: float
+    power_dbfs: float
+    width: float
+    """Share of the band that is cut for it."""
+    moves: bool
+    """Whether its frequency was another one a while ago, as of a sweep."""
 
 
 class Excisor:
@@ -39,12 +56,34 @@ class Excisor:
         self._raw = SampleStream(start, 1 << 16)
         self._blanker = Blanker()
         self._is_active = False
+        self._seen: tuple[NDArray[np.complex64], NDArray[np.uint8], NDArray[np.uint8]] | None = None
+        """A window with lines, its mask, and an earlier one's."""
+        self._look_again = 0
         self._restart(start)
 
     @property
     def next_index(self) -> int:
         """Absolute index of the next sample to push."""
         return self._raw.end
+
+    @property
+    def lines(self) -> list[Line]:
+        """What is cut now, the strongest first; may be read from any thread."""
+        seen = self._seen
+        if seen is None or not self._is_active:
+            return []
+        x, mask, earlier = seen
+        powers = np.abs(np.fft.fft((x - x.mean()) * self._memory.content.window)) ** 2
+        bins = np.flatnonzero(np.roll(mask, SIZE // 2))
+        found = []
+        for group in np.split(bins, np.flatnonzero(np.diff(bins) > 1) + 1):
+            each = group - SIZE // 2
+            of_each = powers[each]
+            # By Parseval's theorem; the mean of the window's square is 1/2.
+            power_dbfs = 10 * math.log10(max(float(of_each.sum()) / (SIZE * SIZE / 2), LEAST_FLOOR))
+            middle = float(np.average(each, weights=of_each)) / SIZE
+            found.append(Line(middle, power_dbfs, len(group) / SIZE, not earlier[each].any()))
+        return sorted(found, key=attrgetter("power_dbfs"), reverse=True)
 
     def push(self, samples: NDArray[np.complex64]) -> NDArray[np.complex64]:
         """Take the next samples `[n]`; returns those that are ready, valid until the next call."""
@@ -119,7 +158,7 @@ class Excisor:
         x = self._raw.view(self._next, self._next + (n + 1) * STRIDE)
         compute.cut_lines(x, n, self._memory, self._room, self._cut, self._found)
         for i in range(n):
-            self._note(self._next // STRIDE + i, i)
+            self._note(self._next // STRIDE + i, i, x)
             if self._n_clean == RELEASE:
                 self._is_active, n = False, i + 1
                 break
@@ -131,10 +170,15 @@ class Excisor:
         self._next = ready
         return True
 
-    def _note(self, window: int, lane: int) -> None:
+    def _note(self, window: int, lane: int, x: NDArray[np.complex64]) -> None:
         n = int(self._found[lane])
         self._n_clean = self._n_clean + 1 if n <= 0 else 0
         self.counters["windows_notched"] += n > 0
         self.counters["windows_not_notched"] += n < 0
         if n > 0:
-            self.cuts.add(window, self._cut[lane].copy())
+            mask = self._cut[lane].copy()
+            self.cuts.add(window, mask)
+            if window >= self._look_again:
+                earlier = mask if self._seen is None else self._seen[1]
+                self._seen = x[lane * STRIDE : lane * STRIDE + SIZE].copy(), mask, earlier
+                self._look_again = window + LOOK_EVERY

@@ -83,6 +83,7 @@ class AirWatch:
                 "pts": seen.points,
                 "mod": seen.modulation,
                 "bad": seen.n_unreadable,
+                "lines": [round(line.offset_hz) for line in seen.lines],
             }
         )
 

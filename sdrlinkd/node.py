@@ -12,7 +12,7 @@ from sdrlinkd import __version__
 from sdrlinkd.airwatch import AirWatch
 from sdrlinkd.bus import Bus, Ingress
 from sdrlinkd.config import Setup
-from sdrlinkd.health import Health
+from sdrlinkd.health import Health, line_told
 from sdrlinkd.hostclock import HostClock
 from sdrlinkd.keeping import Keeping
 from sdrlinkd.link import (
@@ -249,13 +249,18 @@ class Node:
     def why(self, topic_id: int, told: Told) -> list[str]:
         """What happens to a topic's messages and why, in plain sentences.
 
-        If the verdict on the daemon is not OK, it follows the first sentence.
+        If the verdict on the daemon is not OK, it follows the first sentence, and then what the
+        receiver cuts out of what it hears.
         """
         policy, *rest = self._link.why(topic_id, told, self._pdu_link.now())
-        verdict = self.snapshot(0).verdict
-        if verdict.level == "OK":
-            return [policy, *rest]
-        return [policy, f"the link is {verdict.level}: {'; '.join(verdict.reasons)}", *rest]
+        snapshot = self.snapshot(0)
+        verdict, lines = snapshot.verdict, snapshot.carrier.lines
+        heard = [
+            f"the receiver cuts {line_told(line)}: {line.cut_pct:g} % of the band" for line in lines
+        ]
+        if verdict.level != "OK":
+            heard.insert(0, f"the link is {verdict.level}: {'; '.join(verdict.reasons)}")
+        return [policy, *heard, *rest]
 
     def snapshot(self, control_requests: int) -> Snapshot:
         """A snapshot of everything that the daemon reports now."""

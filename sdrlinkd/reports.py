@@ -464,6 +464,21 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Robots heard, in ascending order of ids."""
 
 
+class LineReport(msgspec.Struct, frozen=True, kw_only=True):
+    """A tone or narrow signal of others, which the modem cuts out of what it receives."""
+
+    offset_hz: float
+    """Its frequency relative to the centre of the channel, in Hz."""
+    level_dbfs: float
+    """Its power, in dB relative to full scale."""
+    over_noise_db: float | None = None
+    """Its power over that of the noise, in dB; null: the modem does not listen for energy."""
+    cut_pct: float = 0.0
+    """Share of the band that is cut for it, in %."""
+    sweeps: bool = False
+    """Whether it moves through the band."""
+
+
 class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """The PDU link, which carries the PDUs, and its state."""
 
@@ -492,6 +507,8 @@ class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """How the kernel runs the modem's process, as text for people; empty: nothing was asked."""
     engine: str = ""
     """What computes the modem, as text for people; empty: not known yet."""
+    lines: list[LineReport] = []
+    """Tones and narrow signals that are cut out of the received samples, the strongest first."""
     notices: list[str] = []
     """What a person should know about the PDU link, in sentences."""
 

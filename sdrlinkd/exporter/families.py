@@ -49,8 +49,8 @@ INFO = {
 """Texts that are labels of sdrlink_info."""
 RUNTIME_DIR = "runtime_dir"
 """Label of sdrlink_up, and of sdrlink_info: so a daemon that is gone still has the robot's id."""
-SKIPPED = ("node", "taken_at_unix_ns")
-"""The first is a label of everything; Prometheus has a time of its own."""
+SKIPPED = ("node", "taken_at_unix_ns", "carrier.lines")
+"""A label of everything; Prometheus has a time of its own; and labels without end, of a sweep."""
 
 Labels = tuple[tuple[str, str], ...]
 

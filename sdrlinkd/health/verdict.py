@@ -107,6 +107,12 @@ def _air(snapshot: Snapshot, lately: Lately) -> list[str]:
             f"interference: {skipped} preambles skipped in {RATE_WINDOW_S:g} s, as too many before "
             "them brought no message"
         )
+    crowded = lately.grown(snapshot, "windows_not_notched")
+    if crowded > 0:
+        reasons.append(
+            "interference: narrow signals fill more than three eighths of the band, so they are "
+            "not cut"
+        )
     refused = lately.grown(snapshot, "headers_refused")
     if refused > 0:
         reasons.append(

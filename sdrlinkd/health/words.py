@@ -1,6 +1,6 @@
 """Words for people: the PDU link's name, time spans, shares."""
 
-from sdrlinkd.reports import PduLinkReport
+from sdrlinkd.reports import LineReport, PduLinkReport
 
 _NAMES = {
     "ether": "hub",
@@ -28,3 +28,11 @@ def span(seconds: float) -> str:
 def percent(share: float) -> str:
     """A share as text: `4 %`; below 1 %, with one more digit."""
     return f"{100 * share:.0f} %" if share >= 0.0095 else f"{100 * share:.1f} %"
+
+
+def line_told(line: LineReport) -> str:
+    """A tone or narrow signal that is cut out: where, and how strong."""
+    where = "a sweep" if line.sweeps else f"a line at {line.offset_hz / 1e3:+.0f} kHz"
+    if line.over_noise_db is None:
+        return f"{where}, {line.level_dbfs:.0f} dBFS"
+    return f"{where}, {line.over_noise_db:.0f} dB over the noise"

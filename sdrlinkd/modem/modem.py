@@ -7,7 +7,7 @@ import phy
 from backends import Capabilities
 from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem.clock import Seen
-from sdrlinkd.pdulink import Heard, Observe
+from sdrlinkd.pdulink import Heard, LineSeen, Observe
 
 COUNTERS = (
     "overflows",
@@ -73,6 +73,8 @@ class ModemStatus(NamedTuple):
     """What computes the modem, in words; empty: not known yet."""
     advice: str = ""
     """What to do about what the kernel refused, in a sentence; empty: nothing."""
+    lines: Sequence[LineSeen] = ()
+    """What is cut out of the received samples now, the strongest first."""
 
 
 class ModemUser(Protocol):

@@ -4,7 +4,7 @@ import phy
 from backends import Capabilities
 from sdrlinkd.config import ModemParams
 from sdrlinkd.modem.modem import ModemStatus
-from sdrlinkd.reports import PduLinkReport
+from sdrlinkd.reports import LineReport, PduLinkReport
 
 
 def modem_report(
@@ -37,6 +37,16 @@ def modem_report(
         realtime_ratio=round(ratio, 2) if ratio else None,
         scheduling=modem.scheduling,
         engine=modem.engine,
+        lines=[
+            LineReport(
+                offset_hz=round(line.offset_hz),
+                level_dbfs=round(line.power_dbfs, 1),
+                over_noise_db=None if line.over_noise_db is None else round(line.over_noise_db, 1),
+                cut_pct=round(100 * line.width, 1),
+                sweeps=line.moves,
+            )
+            for line in modem.lines
+        ],
         notices=_notices(state, problem, params, modem, can, stream_end),
     )
 

@@ -1,6 +1,15 @@
 """PDU links, which carry PDUs between nodes: their common interface, and the direct link."""
 
-from sdrlinkd.pdulink.base import AirSeen, BurstSeen, Carry, Heard, Observe, PduLink, PduListener
+from sdrlinkd.pdulink.base import (
+    AirSeen,
+    BurstSeen,
+    Carry,
+    Heard,
+    LineSeen,
+    Observe,
+    PduLink,
+    PduListener,
+)
 from sdrlinkd.pdulink.direct import DirectLink
 from sdrlinkd.pdulink.gnuradio import GnuRadioLink, from_gnu_radio, make_gnuradio, to_gnu_radio
 from sdrlinkd.pdulink.impairment import Arrival, Impairment
@@ -14,6 +23,7 @@ __all__ = [
     "GnuRadioLink",
     "Heard",
     "Impairment",
+    "LineSeen",
     "Observe",
     "PduLink",
     "PduListener",

@@ -38,6 +38,20 @@ class BurstSeen(NamedTuple):
     ending: str
 
 
+class LineSeen(NamedTuple):
+    """A tone or narrow signal that the modem cuts out of what it receives."""
+
+    offset_hz: float
+    """Its frequency in Hz, relative to the centre of the channel."""
+    power_dbfs: float
+    over_noise_db: float | None
+    """Its power over that of the noise in dB; None: the modem does not listen for energy."""
+    width: float
+    """Share of the band that is cut for it."""
+    moves: bool
+    """Whether it sweeps through the band."""
+
+
 class AirSeen(NamedTuple):
     """What a modem has seen of the air since it last said so, for people.
 
@@ -56,6 +70,7 @@ class AirSeen(NamedTuple):
     modulation: str
     n_unreadable: int
     """Preambles without a readable header, of bursts that were too weak or collided."""
+    lines: list[LineSeen]
 
 
 Observe = Callable[[AirSeen], None]

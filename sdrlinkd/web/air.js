@@ -23,7 +23,7 @@ export default {
       <div class="sdr-air-below">
         <figure><figcaption>Spectrum: mean and peak, dBFS{{ bandText }}</figcaption>
           <canvas ref="spectrum" role="img" aria-label="Spectrum"></canvas></figure>
-        <figure><figcaption>Waterfall of peaks, newest on top</figcaption>
+        <figure><figcaption>Waterfall of peaks, newest on top{{ lineText }}</figcaption>
           <canvas ref="fall" role="img" aria-label="Waterfall"></canvas></figure>
         <figure class="square"><figcaption>Last burst: {{ modulation || "none yet" }}</figcaption>
           <canvas ref="points" role="img" aria-label="Constellation"></canvas></figure>
@@ -31,7 +31,7 @@ export default {
     </div>`,
   props: { colors: Array },
   data() {
-    return { span: 2000, summary: "nothing heard yet", modulation: "", bandText: "" };
+    return { span: 2000, summary: "nothing heard yet", modulation: "", bandText: "", lineText: "" };
   },
   created() {
     // Not reactive: thousands of bars.
@@ -73,6 +73,7 @@ export default {
         if (told.band.points.length) this.modulation = told.band.modulation;
         const rate = told.band.rate / 1e6;
         this.unreadable.push([this.now, told.band.unreadable]);
+        this.lineText = this.told(told.band.lines);
         this.bandText = `, ${rate.toFixed(rate < 10 ? 1 : 0)} MHz wide`;
       }
       this.draw();
@@ -165,6 +166,12 @@ export default {
         ? `${shown.length} bursts, ${share.toFixed(1)} % of the time, ${hits} crossed${unread}`
         : "no burst in this time";
     },
+    told(lines) {
+      if (!lines.length) return "";
+      const shown = lines.slice(0, 3).map((hz) => `${hz < 0 ? "−" : "+"}${Math.round(Math.abs(hz) / 1e3)} kHz`);
+      const more = lines.length > 3 ? ` and ${lines.length - 3} more` : "";
+      return `; notched (marked): ${shown.join(", ")}${more}`;
+    },
     drawSpectrum() {
       const [pen, width] = this.prepared(this.$refs.spectrum, 200);
       if (!this.band) return;
@@ -200,6 +207,16 @@ export default {
           pen.fillStyle = `hsl(${240 - 240 * share}, 90%, ${20 + 45 * share}%)`;
           pen.fillRect(k * wide, i * tall, wide + 1, tall + 1);
         });
+      });
+      // A triangle over each line that the receiver cuts out.
+      pen.fillStyle = this.ink;
+      (this.band ? this.band.lines : []).forEach((hz) => {
+        const x = width * (0.5 + hz / this.band.rate);
+        pen.beginPath();
+        pen.moveTo(x - 5, 0);
+        pen.lineTo(x + 5, 0);
+        pen.lineTo(x, 9);
+        pen.fill();
       });
     },
     drawPoints() {

@@ -46,6 +46,7 @@ class _Told(msgspec.Struct, frozen=True):
     pts: bytes = b""
     mod: str = ""
     bad: int = 0
+    lines: list[float] = []
 
 
 _decode = msgspec.msgpack.Decoder(_Told).decode
@@ -58,7 +59,7 @@ class AirLog:
         self._bars: deque[Bar] = deque(maxlen=MOST_BURSTS)
         self._n = 0
         self.band: dict[str, Any] = {}
-        """Rate in Hz, levels of the band in dBFS, points of the last burst, unreadable headers."""
+        """Rate in Hz, levels in dBFS, points of the last burst, unreadable headers, lines in Hz."""
         self.n_looks = 0
         """How often the band was looked at."""
 
@@ -84,6 +85,7 @@ class AirLog:
                 "points": _signed(told.pts),
                 "modulation": told.mod,
                 "unreadable": told.bad,
+                "lines": told.lines,
             }
 
     def since(self, number: int) -> Iterator[Bar]:

@@ -6,6 +6,7 @@ from sdrlinkd.reports import (
     BusReport,
     ClockReport,
     LatencyReport,
+    LineReport,
     LinkReport,
     NeighborReport,
     PduLinkReport,
@@ -31,7 +32,11 @@ SNAPSHOT = Snapshot(
         reasons=["robot 2 has a different registry", "robot 2 hears us at 3 dB, 4 % lost"],
     ),
     carrier=PduLinkReport(
-        kind="direct", state="up", detail="1 Mbit/s, loss 0.1", level_dbfs=-31.25, clipped_pct=0.5
+        kind="direct", state="up", detail="1 Mbit/s, loss 0.1", level_dbfs=-31.25, clipped_pct=0.5,
+        lines=[
+            LineReport(offset_hz=312e3, level_dbfs=-40, over_noise_db=18.2, cut_pct=0.6),
+            LineReport(offset_hz=-9e3, level_dbfs=-50, sweeps=True),
+        ],
     ),
     bus=BusReport(
         runtime_dir="/run/sdrlinkd",

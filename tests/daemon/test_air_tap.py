@@ -75,7 +75,7 @@ class FakeLink:
 
 
 def seen(*bursts):
-    return AirSeen(5.0, 2e6, list(bursts), b"", b"", b"", "", 0)
+    return AirSeen(5.0, 2e6, list(bursts), b"", b"", b"", "", 0, [])
 
 
 def burst(at, n_good=1):

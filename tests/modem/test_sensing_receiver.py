@@ -306,3 +306,27 @@ def test_a_burst_after_pulses_ends_them():
     assert sensed.pulses == ()
     assert sensed.carrier_at == sensed.burst_at
     assert sensed.carrier_end == sensed.idle_since
+
+
+def test_it_tells_which_lines_it_cuts_and_how_strong_they_are():
+    receiving = make_receiving()
+    x = 1e-2 * no_burst(47, 200_000)
+    x = phy.Jammer("tone", -22, RATE, 1, offset_hz=312e3, times=[(0, 0.1)]).add(x, 0)
+    x = phy.Jammer("sweep", -25, RATE, 1, times=[(0.06, 0.1)]).add(x, 0)
+    told = []
+    for first in range(0, len(x), 1000):
+        piece = x[first : first + 1000]
+        receiving.hear(RxBlock(first, 1000, piece, "", 0))
+        told.append(receiving.lines)
+    line, *others = told[50]
+    assert not others
+    assert (line.offset_hz, line.power_dbfs, line.moves) == (
+        pytest.approx(312e3, abs=200),
+        pytest.approx(-22, abs=0.2),
+        False,
+    )
+    # The noise has -40 dBFS.
+    assert line.over_noise_db == pytest.approx(18, abs=0.5)
+    assert 3 / 512 <= line.width <= 9 / 512
+    assert any(each.moves for lines in told[62:98] for each in lines)
+    assert told[-1] == []

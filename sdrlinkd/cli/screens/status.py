@@ -15,11 +15,14 @@ from sdrlinkd.cli.screens.rows import (
     robots_table,
     sent_table,
 )
+from sdrlinkd.health import line_told
 from sdrlinkd.reports import Snapshot
 from sdrlinkd.tables import FittedTable, figure, words, wrapped
 
 INDENT = 7
 REASON_LINES = 2
+MOST_LINES = 3
+"""Most tones and narrow signals that are named."""
 
 
 class StatusScreen:
@@ -108,7 +111,9 @@ def head(snapshot: Snapshot, width: int) -> list[Text]:
         f"{rx.pdus_heard} PDUs, {rx.started} started = {rx.delivered} delivered + {rx.held} "
         f"incomplete + {sum(rx.dropped.values())} lost"
     )
-    lines = (("robot", robot), ("radio", radio), ("air", air), ("out", out), ("in", into))
+    lines = [("robot", robot), ("radio", radio), ("air", air), ("out", out), ("in", into)]
+    if pdu_link.lines:
+        lines.insert(2, ("cut", "; ".join(line_told(each) for each in pdu_link.lines[:MOST_LINES])))
     texts = [_labelled(label, told, width) for label, told in lines]
     if pdu_link.state != "up":
         texts[1].stylize("red")

@@ -178,7 +178,7 @@ class _Served:
                 scheduling=self._scheduling.told,
                 advice=self._scheduling.advice,
             )
-        noted = now.detail, now.trouble, {**now.counters, **RUNNING}
+        noted = now.detail, now.trouble, len(now.lines), {**now.counters, **RUNNING}
         if in_any_case or noted != self._noted:
             self._noted = noted
             self._say(protocol.status_of(now))

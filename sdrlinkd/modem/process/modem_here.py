@@ -119,6 +119,7 @@ class ModemHere:
             0.0 if levels is None else levels.clipped,
             counters,
             0.0 if self._rx is None else self._rx.load.realtime_ratio,
+            lines=[] if self._receiving is None else self._receiving.lines,
         )
 
     @property

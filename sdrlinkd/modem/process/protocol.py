@@ -16,7 +16,7 @@ import msgspec
 from backends import AbsentError, BackendError, Patience, RefusalError
 from sdrlinkd.link import Outcome
 from sdrlinkd.modem.modem import BurstOrder, ModemStatus
-from sdrlinkd.pdulink import AirSeen, Heard
+from sdrlinkd.pdulink import AirSeen, Heard, LineSeen
 
 MOST_BYTES = 1 << 18
 """Largest message: 63 PDUs of 2047 B, and some more."""
@@ -136,6 +136,7 @@ class Status(msgspec.Struct, frozen=True, array_like=True, tag="status"):
     scheduling: str
     engine: str
     advice: str
+    lines: list[LineSeen]
 
 
 class Observed(msgspec.Struct, frozen=True, array_like=True, tag="observed"):
@@ -169,6 +170,7 @@ def status_of(status: ModemStatus) -> Status:
         status.scheduling,
         status.engine,
         status.advice,
+        list(status.lines),
     )
 
 

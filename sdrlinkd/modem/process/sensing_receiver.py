@@ -10,6 +10,7 @@ import phy
 from backends import SENDING, RxBlock
 from sdrlinkd.link import Sensed
 from sdrlinkd.modem.process.observer import Observer
+from sdrlinkd.pdulink import LineSeen
 
 # The energy of a burst may seem to end later than its header says, by this many samples.
 TAIL = 2 * phy.SENSE_WINDOW
@@ -52,7 +53,7 @@ class SensingReceiver:
         if self._sense is not None:
             self.sensed = self._sense_air(self._sense)
         if (observer := self.observer) is not None:
-            observer.take(block, events)
+            observer.take(block, events, lambda: self.lines)
         return events
 
     def flush(self) -> Sequence[phy.Event]:
@@ -63,6 +64,21 @@ class SensingReceiver:
     def next_index(self) -> int:
         """The index after the last sample heard."""
         return self._excisor.next_index
+
+    @property
+    def lines(self) -> list[LineSeen]:
+        """What is cut out of the samples now; may be read from any thread."""
+        noise_dbfs = None if self._sense is None else self._sense.noise_dbfs
+        return [
+            LineSeen(
+                line.frequency * self._rate_hz,
+                line.power_dbfs,
+                None if noise_dbfs is None else line.power_dbfs - noise_dbfs,
+                line.width,
+                line.moves,
+            )
+            for line in self._excisor.lines
+        ]
 
     @property
     def counters(self) -> Counter[str]:
