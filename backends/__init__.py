@@ -30,7 +30,7 @@ from backends.base import (
 from backends.hub_address import HubAddress, hub_at, hub_in, hub_of, is_listening
 from backends.late import LateRadio
 from backends.outstanding import GAP
-from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
+from backends.params import EtherParams, IqFileParams, JammerParams, LoopbackParams, ZmqParams
 from backends.recording import GAP_LABEL, RecordingInfo, RecordingReader, describe, refuse_same
 from backends.registry import BUILT_IN, find_backend, installed_names
 from backends.samples import SAMPLE_TYPES
@@ -60,7 +60,6 @@ if TYPE_CHECKING:
         EtherRadio,
         Hop,
         HubWatch,
-        JammerParams,
         LinkOverride,
         LocalEther,
         Outage,

@@ -1,15 +1,28 @@
 """Simulated air between one node's transmitter and a receiver, on one sample index."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from backends.base import BackendError, Samples
 from backends.line import Line
-from phy import FrontEnd, FrontEndParams, Path, PathParams
+from backends.params import JammerParams
+from phy import FrontEnd, FrontEndParams, Jammer, Path, PathParams
 
 AIR_CPU_MS = "air_cpu_ms"
+
+
+def make_jammers(params: Sequence[JammerParams], noise_dbfs: float, rate_hz: float) -> list[Jammer]:
+    """The jammers at a receiver with that noise; all receivers get the same waveforms."""
+    return [
+        Jammer(
+            each.kind, noise_dbfs + each.over_noise_db, rate_hz, i, offset_hz=each.offset_hz,
+            width_hz=each.width_hz, period_s=each.period_s, duty=each.duty, times=each.times,
+        )
+        for i, each in enumerate(params)
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -19,6 +32,7 @@ class Channel:
     path: PathParams
     front_end: FrontEndParams = field(default_factory=FrontEndParams)
     seed: int = 0
+    jammers: Sequence[JammerParams] = ()
 
     def make_path(self) -> Path:
         """Make the path. Raises BackendError for an unknown profile."""
@@ -31,6 +45,10 @@ class Channel:
         """Make the front end, with a random number generator of its own."""
         rng = np.random.Generator(np.random.SFC64([self.seed, 2]))
         return FrontEnd(self.front_end, rng)
+
+    def make_jammers(self) -> list[Jammer]:
+        """Make the jammers."""
+        return make_jammers(self.jammers, self.front_end.noise_dbfs, self.path.rate_hz)
 
 
 class AirCost:

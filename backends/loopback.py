@@ -41,6 +41,7 @@ class LoopbackRadio:
         self._path = channel.make_path()
         self._timeline = Timeline()
         self._front_end = channel.make_front_end()
+        self._jammers = channel.make_jammers()
         self._profile = channel.path.profile
         self._block_s = block_s
         self._paced = paced
@@ -150,5 +151,7 @@ class LoopbackRadio:
                 self._next += n
             if not reason:
                 antenna = np.zeros(n, np.complex64) if heard is None else heard
+                for jammer in self._jammers:
+                    antenna = jammer.add(antenna, first)
                 samples = self._front_end.receive(antenna)
         return RxBlock(first, n, samples, reason, self._pace.host_ns(first + n))

@@ -1,9 +1,11 @@
-"""Settings of radios without a device: sections of the configuration."""
+"""Settings of radios without a device: parts of the configuration, and of scenarios."""
 
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
+
+Decibel = Annotated[float, Meta(ge=-300, le=300)]
 
 
 class LoopbackParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -58,3 +60,20 @@ class ZmqParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Lead of sending over receiving: what may be in transit through the peer."""
     paced: bool = True
     """The peer keeps real time; while it is away, the local clock sets the pace."""
+
+
+class JammerParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A signal that disturbs all receivers; frequencies in Hz from the centre, times in s."""
+
+    kind: Literal["tone", "narrow", "sweep", "pulses", "noise"] = "tone"
+    """A carrier, noise `width_hz` wide, a carrier that goes through `width_hz` in each `period_s`,
+    noise in a share `duty` of each `period_s`, or noise in the whole band."""
+    over_noise_db: Decibel = 30.0
+    """Its mean power while it sends, over a receiver's noise in the band."""
+    offset_hz: Annotated[float, Meta(ge=-1e8, le=1e8)] = 0.0
+    width_hz: Annotated[float, Meta(ge=0, le=2e8)] = 0.0
+    """0: the whole band."""
+    period_s: Annotated[float, Meta(gt=0, le=1e3)] = 0.01
+    duty: Annotated[float, Meta(gt=0, le=1)] = 0.02
+    times: list[Annotated[list[float], Meta(min_length=2, max_length=2)]] = []
+    """When it sends, as [begin, end]; []: always."""

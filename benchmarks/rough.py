@@ -56,6 +56,9 @@ _JAMMED = (
     _Jammed("cw_20db_64qam34_220B_25db", "tone", 20, 1, 0.015, QAM64_34, 220, 25.0),
     _Jammed("three_tones_10db_64qam34_220B_25db", "tone", 10, 3, 0.05, QAM64_34, 220, 25.0),
 )
+_JAMMERS: tuple[Literal["tone", "narrow", "sweep", "pulses", "noise"], ...] = (
+    "tone", "narrow", "sweep", "pulses", "noise",
+)  # fmt: skip
 _JAMMED_HZ, _SETTLED, _AT_ONCE = 1e6, 20_000, 10
 _DUTY, _PERIOD_S = 0.02, {"tone": 1.0, "narrow": 1.0, "sweep": 0.01, "pulses": 0.001}
 _LIQUID_FRAMES, _LIQUID_PPM = 300, 1.0
@@ -87,7 +90,11 @@ def _rows(seed: int, quick: bool) -> Iterator[Row]:
                 row.peers["liquid-dsp g2412, equal clocks"] = _liquid_lost(air, n_bytes, seed)
         yield row
     for jammed in _JAMMED:
-        yield _beside(jammed, seed, quick)
+        row = _beside(jammed, seed, quick)
+        if jammed.mcs == QPSK12:
+            with attempt("liquid-dsp"):
+                row.peers["liquid-dsp g2412"] = _liquid_jammed(jammed, seed)
+        yield row
     yield _penalty(seed, quick)
     for mcs, louder_db, target in ((QPSK12, 10, 0.97), (QAM64_34, 20, 0.9)):
         yield _second_burst(mcs, louder_db, target, seed, quick)
@@ -96,7 +103,7 @@ def _rows(seed: int, quick: bool) -> Iterator[Row]:
     yield _busy_beside_a_tone(seed)
     for step_db in (-3.0, -6.0):
         yield _step(step_db, seed, quick)
-    yield _false_pdus(seed, 10**6 if quick else 10**8)
+    yield _false_pdus(seed, 10**6 if quick else 10**9)
 
 
 def _noise(rng: np.random.Generator, n: int, power: float = 1.0) -> NDArray[np.complex64]:
@@ -199,30 +206,46 @@ def _beside(jammed: _Jammed, seed: int, quick: bool) -> Row:
 
 def _jammed_lost(jammed: _Jammed, seed: int, n: int) -> ErrorRate:
     rng, transmitter, errors = np.random.default_rng(seed), Transmitter(), 0
-    share_db = jammed.power_db - 10 * np.log10(jammed.n_tones)
-    if jammed.kind == "pulses":
-        share_db -= 10 * np.log10(_DUTY)
     for _ in range(n // _AT_ONCE):
         pdus = [rng.bytes(jammed.n_bytes) for _ in range(_AT_ONCE)]
-        gaps = rng.integers(1200, 1800, _AT_ONCE)
-        parts = [
-            np.pad(transmitter.modulate([pdu], jammed.mcs), (gap, 0))
-            for pdu, gap in zip(pdus, gaps.tolist(), strict=True)
-        ]
-        x = np.pad(np.concatenate(parts), (_SETTLED, 3000))
-        x = x + _noise(rng, len(x), 10 ** (-jammed.snr_db / 10))
-        for _ in range(jammed.n_tones if jammed.power_db > -np.inf else 0):
-            offset_hz = 0.0 if jammed.kind == "sweep" else rng.uniform(-0.4, 0.4) * _JAMMED_HZ
-            width_hz = 3 / 64 * _JAMMED_HZ if jammed.kind == "narrow" else 0.0
-            x = Jammer(
-                jammed.kind, share_db, _JAMMED_HZ, int(rng.integers(1 << 30)),
-                offset_hz=offset_hz, width_hz=width_hz, period_s=_PERIOD_S[jammed.kind], duty=_DUTY,
-            ).add(x, int(rng.integers(10_000)))  # fmt: skip
+        x = _jam(jammed, [transmitter.modulate([pdu], jammed.mcs) for pdu in pdus], rng)
         receiver, excisor = Receiver(), Excisor()
         receiver.cuts = excisor.cuts
         events = receiver.push(excisor.push(x)) + receiver.push(excisor.flush())
         errors += len(set(pdus) - {each.data for each in events if isinstance(each, PduHeard)})
     return ErrorRate(n, errors)
+
+
+def _liquid_jammed(jammed: _Jammed, seed: int) -> float:
+    """The share of frames that liquid-dsp loses beside such a jammer, with QPSK and rate 1/2."""
+    rng, liquid, heard = np.random.default_rng(seed), Liquid(), 0
+    wave = liquid.frame("g2412", 2, jammed.n_bytes, seed)
+    wave /= np.sqrt(np.mean(np.abs(wave) ** 2))
+    for _ in range(_LIQUID_FRAMES // _AT_ONCE):
+        heard += liquid.heard(jammed.n_bytes, seed, _jam(jammed, [wave] * _AT_ONCE, rng))
+    return 1 - heard / _LIQUID_FRAMES
+
+
+def _jam(
+    jammed: _Jammed, waves: list[NDArray[np.complex64]], rng: np.random.Generator
+) -> NDArray[np.complex64]:
+    """Bursts of power 1 in noise, beside the jammer, which has begun long before."""
+    gaps = rng.integers(1200, 1800, len(waves)).tolist()
+    parts = [np.pad(wave, (gap, 0)) for wave, gap in zip(waves, gaps, strict=True)]
+    x = np.pad(np.concatenate(parts), (_SETTLED, 3000))
+    x = x + _noise(rng, len(x), 10 ** (-jammed.snr_db / 10))
+    power_db = jammed.power_db - 10 * np.log10(jammed.n_tones)
+    if jammed.kind == "pulses":
+        # That of a jammer is while it sends.
+        power_db -= 10 * np.log10(_DUTY)
+    for _ in range(jammed.n_tones if jammed.power_db > -np.inf else 0):
+        offset_hz = 0.0 if jammed.kind == "sweep" else rng.uniform(-0.4, 0.4) * _JAMMED_HZ
+        width_hz = 3 / 64 * _JAMMED_HZ if jammed.kind == "narrow" else 0.0
+        x = Jammer(
+            jammed.kind, power_db, _JAMMED_HZ, int(rng.integers(1 << 30)),
+            offset_hz=offset_hz, width_hz=width_hz, period_s=_PERIOD_S[jammed.kind], duty=_DUTY,
+        ).add(x, int(rng.integers(10_000)))  # fmt: skip
+    return x
 
 
 def _penalty(seed: int, quick: bool) -> Row:
@@ -314,8 +337,10 @@ def _lost(name: str, lost: ErrorRate, target: float, note: str, quick: bool) -> 
 
 
 def _false_pdus(seed: int, n_samples: int) -> Row:
-    """Whatever a radio may bring but bursts: how often it is taken for a PDU."""
-    rng, receiver, told = np.random.default_rng(seed), Receiver(), 0
+    """How often whatever a radio may bring but bursts is taken for a PDU, behind the excisor."""
+    rng, told = np.random.default_rng(seed), 0
+    receiver, excisor = Receiver(), Excisor()
+    receiver.cuts = excisor.cuts
     block = 1 << 16
     while receiver.counters["samples"] < n_samples:
         x = _noise(rng, block, 10 ** rng.uniform(-6, 6)).copy()
@@ -328,11 +353,16 @@ def _false_pdus(seed: int, n_samples: int) -> Row:
             x[at:] *= np.float32(10 ** rng.uniform(-3, 3))
         elif kind == 3:
             x[at:] += np.complex64(10 ** rng.uniform(-3, 3))
-        elif kind == 4:
-            turn = np.exp(2j * np.pi * rng.uniform(-0.5, 0.5) * np.arange(block - at))
-            x[at:] += (turn * 10 ** rng.uniform(-3, 3)).astype(np.complex64)
-        told += sum(isinstance(event, PduHeard) for event in receiver.push(x))
-    note = "silence, saturation, steps of level and DC, carriers, noise"
+        else:
+            jammer = Jammer(
+                _JAMMERS[int(rng.integers(len(_JAMMERS)))], rng.uniform(-60, 60), _JAMMED_HZ,
+                int(rng.integers(1 << 30)), offset_hz=rng.uniform(-0.5, 0.5) * _JAMMED_HZ,
+                width_hz=rng.uniform(0, 0.2) * _JAMMED_HZ, period_s=10 ** rng.uniform(-4, -1),
+                duty=10 ** rng.uniform(-3, 0),
+            )  # fmt: skip
+            x[at:] = jammer.add(x[at:], 0)
+        told += sum(isinstance(each, PduHeard) for each in receiver.push(excisor.push(x)))
+    note = "silence, saturation, steps of level and DC, noise, every jammer; behind the excisor"
     n = receiver.counters["samples"]
     return Row("false_pdus", told, "PDUs", 0, "less", n, note=note)
 

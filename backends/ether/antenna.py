@@ -6,13 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from backends.air import make_jammers
 from backends.base import SENDING, Capabilities, RxBlock, TxBurst, TxOutcome, TxReport
 from backends.ether import protocol
 from backends.ether.ear import Piece
 from backends.ether.medium import NOISE_DBFS
-from backends.ether.world import JammerParams, RadioParams
+from backends.ether.world import RadioParams
 from backends.outstanding import NEVER
-from phy import FrontEnd, FrontEndParams, Jammer
+from backends.params import JammerParams
+from phy import FrontEnd, FrontEndParams
 
 NOTHING_DB = 300.0
 
@@ -35,14 +37,7 @@ class Antenna:
         self, radio: RadioParams, seed: int, rate_hz: float, jammers: Sequence[JammerParams] = ()
     ) -> None:
         self._radio = radio
-        # All receive the same, so their waveforms have one seed.
-        self._jammers = [
-            Jammer(
-                each.kind, NOISE_DBFS + each.over_noise_db, rate_hz, i, offset_hz=each.offset_hz,
-                width_hz=each.width_hz, period_s=each.period_s, duty=each.duty, times=each.times,
-            )
-            for i, each in enumerate(jammers)
-        ]  # fmt: skip
+        self._jammers = make_jammers(jammers, NOISE_DBFS, rate_hz)
         self._index_error = 0 if radio.timestamps else round(radio.index_error_s * rate_hz)
         self._rng = np.random.Generator(np.random.SFC64(seed))
         front_end = FrontEndParams(

@@ -17,7 +17,8 @@ from msgspec import Meta
 
 from backends.base import Samples
 from backends.ether.way import Way
-from backends.ether.world import JammerParams, RadioParams
+from backends.ether.world import RadioParams
+from backends.params import JammerParams
 
 VERSION = 2
 

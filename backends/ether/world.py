@@ -8,29 +8,12 @@ from typing import Annotated, Literal, NamedTuple
 import msgspec
 from msgspec import Meta
 
+from backends.params import Decibel, JammerParams
+
 SPEED_OF_LIGHT = 299_792_458.0
 LEAST_DISTANCE_M = 1.0
 
 NEVER_OFF: Mapping[int, Sequence["Outage"]] = {}
-
-Decibel = Annotated[float, Meta(ge=-300, le=300)]
-
-
-class JammerParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A signal that disturbs all nodes; frequencies in Hz from the channel's centre, times in s."""
-
-    kind: Literal["tone", "narrow", "sweep", "pulses", "noise"] = "tone"
-    """A carrier, noise `width_hz` wide, a carrier that goes through `width_hz` in each `period_s`,
-    noise in a share `duty` of each `period_s`, or noise in the whole band."""
-    over_noise_db: Decibel = 30.0
-    """Its mean power while it sends, over a receiver's noise in the band."""
-    offset_hz: Annotated[float, Meta(ge=-1e8, le=1e8)] = 0.0
-    width_hz: Annotated[float, Meta(ge=0, le=2e8)] = 0.0
-    """0: the whole band."""
-    period_s: Annotated[float, Meta(gt=0, le=1e3)] = 0.01
-    duty: Annotated[float, Meta(gt=0, le=1)] = 0.02
-    times: list[Annotated[list[float], Meta(min_length=2, max_length=2)]] = []
-    """When it sends, as [begin, end]; []: always."""
 
 
 class AirParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from backends import JammerParams
+
 SIMULATED_HZ = 2.45e9
 Decibel = Annotated[float, Meta(ge=-300)]
 
@@ -153,3 +155,7 @@ class ChannelParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """DC offset of the receiver in dBFS; -inf: none."""
     adc_bits: Annotated[int, Meta(ge=0, le=24)] = 0
     """Resolution of the receiver's ADC in bits; 0: ideal."""
+    jammer: list[JammerParams] = []
+    """Signals of others that disturb a `loopback`, each a table `[[channel.jammer]]`. Its keys are
+    those of `[[air.jammer]]` in a scenario: kind, over_noise_db, offset_hz, width_hz, period_s,
+    duty and times."""

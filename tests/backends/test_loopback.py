@@ -9,7 +9,7 @@ import weakref
 import numpy as np
 import pytest
 
-from backends import GAP, Channel, LoopbackRadio, TxBurst, TxOutcome
+from backends import GAP, Channel, JammerParams, LoopbackRadio, TxBurst, TxOutcome
 from backends.testing import CONSTANTS, MAX_LATE_BLOCKS, Pace
 from phy import FrontEndParams, PathParams
 from tests.backends.radios import (
@@ -205,3 +205,16 @@ async def test_a_block_ends_where_a_burst_has_arrived(monkeypatch):
     end = 5730 + GAP
     short = {block.index: block.n for block in taken if block.n != N}
     assert short == {end // N * N: end % N}
+
+
+async def test_a_jammer_comes_and_goes():
+    tone = JammerParams(over_noise_db=30.0, offset_hz=25e3, times=[[0.02, 0.04]])
+    channel = Channel(PathParams(rate_hz=RATE), FrontEndParams(noise_dbfs=-50.0), 1, [tone])
+    radio = await opened(LoopbackRadio(channel, BLOCK_S, paced=False))
+    blocks = await take(radio.blocks(), 30)
+    await radio.close()
+    levels = [10 * np.log10(np.mean(np.abs(block.samples) ** 2)) for block in blocks]
+    is_jammed = [10 <= number < 20 for number in range(30)]
+    assert levels == [pytest.approx(-20 if each else -50, abs=1.5) for each in is_jammed]
+    spectrum = np.abs(np.fft.fft(blocks[12].samples))
+    assert np.argmax(spectrum) == N // 4

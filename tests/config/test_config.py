@@ -96,6 +96,7 @@ def test_shipped_registry_is_the_papers_table_4():
         ),
         ('[iqfile]\nformat = "cu8"', ["iqfile.format", '"cu8"', '"ci16_le"']),
         ('[channel]\nprofile = "x"', ["channel.profile", '"awgn"']),
+        ('[[channel.jammer]]\nkind = "x"', ["channel.jammer", '"tone"']),
         ("nonsense", ["not TOML"]),
         ('[topic.odom]\nqos = "hi"', ["f.toml:2", "topic.odom.qos", '"hi"', '"urgent"']),
         ("[topic.odom]\nprio = 3", ["topic.odom.prio", "did you mean priority"]),

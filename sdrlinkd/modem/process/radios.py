@@ -78,4 +78,5 @@ def _channel(config: Config, seed: int) -> "Channel":
             bits=air.adc_bits,
         ),
         seed,
+        air.jammer,
     )
