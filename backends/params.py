@@ -71,9 +71,12 @@ class JammerParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     over_noise_db: Decibel = 30.0
     """Its mean power while it sends, over a receiver's noise in the band."""
     offset_hz: Annotated[float, Meta(ge=-1e8, le=1e8)] = 0.0
+    """Its middle; a pulse or noise has none."""
     width_hz: Annotated[float, Meta(ge=0, le=2e8)] = 0.0
-    """0: the whole band."""
+    """Its width; 0: the whole band."""
     period_s: Annotated[float, Meta(gt=0, le=1e3)] = 0.01
+    """Time from sweep to sweep, or from pulse to pulse."""
     duty: Annotated[float, Meta(gt=0, le=1)] = 0.02
+    """Share of the period that a pulse takes."""
     times: list[Annotated[list[float], Meta(min_length=2, max_length=2)]] = []
     """When it sends, as [begin, end]; []: always."""
