@@ -210,10 +210,8 @@ async def test_a_block_ends_where_a_burst_has_arrived(monkeypatch):
 async def test_a_jammer_comes_and_goes():
     tone = JammerParams(over_noise_db=30.0, offset_hz=25e3, times=[[0.02, 0.04]])
     channel = Channel(PathParams(rate_hz=RATE), FrontEndParams(noise_dbfs=-50.0), 1, [tone])
-    async with opened(LoopbackRadio(channel, BLOCK_S, paced=False)) as radio:
-        blocks = await take(radio.blocks(), 30)
-    levels = [10 * np.log10(np.mean(np.abs(block.samples) ** 2)) for block in blocks]
+    x = await stream(LoopbackRadio(channel, BLOCK_S, paced=False), 30 * N)
+    levels = 10 * np.log10(np.mean(np.abs(x.reshape(30, N)) ** 2, axis=1))
     is_jammed = [10 <= number < 20 for number in range(30)]
-    assert levels == [pytest.approx(-20 if each else -50, abs=1.5) for each in is_jammed]
-    spectrum = np.abs(np.fft.fft(blocks[12].samples))
-    assert np.argmax(spectrum) == N // 4
+    assert levels.tolist() == [pytest.approx(-20 if each else -50, abs=1.5) for each in is_jammed]
+    assert np.argmax(np.abs(np.fft.fft(x[12 * N : 13 * N]))) == N // 4
