@@ -51,6 +51,7 @@ _JAMMED = (
     _Jammed("three_tones_lost_10db", "tone", 10, 3, 0.005),
     _Jammed("narrow_lost_10db", "narrow", 10, 1, 0.005),
     _Jammed("sweep_10ms_lost_10db", "sweep", 10, 1, 0.005),
+    _Jammed("sweep_10ms_lost_10db_220B_25db", "sweep", 10, 1, 0.005, QPSK12, 220, 25.0),
     _Jammed("pulses_2pct_lost_0db", "pulses", 0, 1, 0.02),
     _Jammed("pulses_2pct_lost_10db", "pulses", 10, 1, 0.03),
     _Jammed("cw_20db_64qam34_220B_25db", "tone", 20, 1, 0.015, QAM64_34, 220, 25.0),

@@ -10,7 +10,7 @@ from phy.kernels.fft import circle
 from phy.kernels.inline import step
 from phy.kernels.lanes import Lanes, load, splat, store, total
 from phy.kernels.local import local
-from phy.kernels.smoothing import smooth, start
+from phy.kernels.smoothing import mean_delay, smooth, start
 from phy.sizes import N_LANES
 from phy.tables.burst import GAIN, NO, SCALED, Channel, Planes, Row, Scratch, Tones
 
@@ -19,6 +19,8 @@ _SURELY = 4.0
 _LARGEST_BOOST = 3.0
 # Steps in which the gains of subcarriers that were cut are found.
 _FILLS = 8
+# They begin with the mean of the gains that are at most so much farther than the nearest.
+_NEXT = 4
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -128,8 +130,25 @@ def _leave_out(y: NDArray[np.float32], n: int, tones: Tones, channel: Channel) -
 def _fill(variance: float, tones: Tones, channel: Channel, scratch: Scratch) -> None:
     """Give the tones that were cut the gains that the smoother expects from all others.
 
-    Each step of expectation maximisation puts what was expected in the place of what is missing.
+    They begin with the gains next to them, with the mean delay. Each step of expectation
+    maximisation puts what was expected in their place.
     """
+    delay = mean_delay(channel.h, tones.neighbors)
+    for k in range(tones.bins.size):
+        if channel.kept[0, k] == 0:
+            near = tones.n_fft
+            for i in range(tones.bins.size):
+                if channel.kept[0, i] != 0:
+                    near = min(near, abs(tones.subcarriers[i] - tones.subcarriers[k]))
+            mean, n = 0j, 0
+            for i in range(tones.bins.size):
+                apart = tones.subcarriers[k] - tones.subcarriers[i]
+                if channel.kept[0, i] != 0 and abs(apart) < near + _NEXT:
+                    turn = complex(math.cos(delay * apart), math.sin(delay * apart))
+                    mean += complex(channel.h[0, i], channel.h[1, i]) * turn
+                    n += 1
+            if n:
+                channel.h[0, k], channel.h[1, k] = mean.real / n, mean.imag / n
     measured = local(np.float32, channel.h.shape)
     for k in range(measured.shape[1]):
         measured[0, k], measured[1, k] = channel.h[0, k], channel.h[1, k]

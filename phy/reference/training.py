@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from phy.numerology import Numerology
 from phy.reference.channel import Channel
 from phy.reference.ofdm import Subcarriers
-from phy.reference.smoothing import smooth
+from phy.reference.smoothing import mean_delay, smooth
 
 SURELY = 4.0
 """Number of standard deviations from which a difference in strength is not chance."""
@@ -15,6 +15,8 @@ LARGEST_BOOST = 3.0
 
 FILLS = 8
 """Steps in which the gains of subcarriers that were cut are found."""
+NEXT = 4
+"""They begin with the mean of the gains that are at most so much farther than the nearest."""
 
 
 def least_squares(
@@ -39,7 +41,8 @@ def estimate(
     """Estimate the channel from known symbols by least squares, without the probable noise.
 
     The noise of a gain is v = N / Σ_s a_s². Subcarriers with 0 in `kept` `[n_used]` are not known:
-    they get the gains that the smoother expects, again and again (expectation maximisation).
+    they get those next to them, with the mean delay, and then the gains that the smoother expects,
+    again and again (expectation maximisation).
     """
     is_kept = np.ones(grid.n_used, bool) if kept is None else kept > 0
     h, no = least_squares(np.where(is_kept, y, 0), sent, amplitude)
@@ -47,7 +50,12 @@ def estimate(
     no = max(no / share, 1e-20)
     power, v = float(np.mean(np.abs(h) ** 2)) / share, no / float(np.sum(amplitude**2))
     channel = Channel(h, no, max(power - v, 1e-3 * power, 1e-20))
-    if not is_kept.all():
+    if is_kept.any() and not is_kept.all():
+        delay, used = mean_delay(h, grid), grid.used[is_kept]
+        for k in np.flatnonzero(~is_kept):
+            apart = grid.used[k] - used
+            near = np.abs(apart) < np.abs(apart).min() + NEXT
+            h[k] = np.mean(h[is_kept][near] * np.exp(1j * delay * apart[near]))
         for _ in range(FILLS):
             smooth(h, v, channel, grid)
             h = np.where(is_kept, h, channel.h)

@@ -99,6 +99,17 @@ def test_beside_a_jammer_bursts_are_heard(rng, kind, power_db, settings):
     assert not heard(in_use().receiver().push(x))
 
 
+@pytest.mark.parametrize("engine", ["in use", "reference"])
+def test_subcarriers_that_were_cut_in_the_preamble_come_back(rng, engine):
+    """A sweep is somewhere else with each burst, and at the edge of the band with some."""
+    kind = reference.Receiver if engine == "reference" else in_use().receiver
+    pdus, x = a_stream(rng, 1, 220, 1, 25)
+    x = np.concatenate((noise(rng, SETTLED, 0.003), x))
+    for place in range(0, 10_000, 500):
+        sweep = Jammer("sweep", 10, RATE_HZ, place)
+        assert received(sweep.add(x, place), kind()) == pdus
+
+
 @pytest.mark.parametrize(
     ("power_db", "offset_hz"), [(0, 100.0), (0, 200.0), (0, 400.0), (40, 40.0), (40, 100.0)]
 )
