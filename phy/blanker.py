@@ -1,5 +1,7 @@
 """Sets pulses of interference to zero: ignition, radars, other radios that jump by."""
 
+from collections import Counter
+
 import numpy as np
 
 from phy import compute
@@ -24,11 +26,10 @@ class Blanker:
     RELEASE blocks without one.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, counters: Counter[str]) -> None:
         self.is_active = False
         """Whether samples have to wait for those behind them."""
-        self.n_pulses = 0
-        """Number of blocks that had a pulse."""
+        self._counters = counters
         self._power = np.empty(BLOCK, np.float32)
         self._found = np.zeros(_AT_ONCE, np.uint8)
         self._before = 0.0
@@ -72,7 +73,7 @@ class Blanker:
         x = stream.view(self._next, self._next + (n + 1) * BLOCK)
         self._before = compute.blank(x, n, self._before, self._power, self._found)
         pulses = np.flatnonzero(self._found[:n])
-        self.n_pulses += len(pulses)
+        self._counters["pulses_blanked"] += len(pulses)
         self._n_clean = n - 1 - int(pulses[-1]) if len(pulses) else self._n_clean + n
         self.is_active = self._n_clean < RELEASE
         self._next += n * BLOCK

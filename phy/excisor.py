@@ -54,7 +54,7 @@ class Excisor:
         self._found = np.zeros(N_LANES, np.int64)
         self._room = np.empty(N_LANES * STRIDE, np.complex64)
         self._raw = SampleStream(start, 1 << 16)
-        self._blanker = Blanker()
+        self._blanker = Blanker(self.counters)
         self._is_active = False
         self._seen: tuple[NDArray[np.complex64], NDArray[np.uint8], NDArray[np.uint8]] | None = None
         """A window with lines, its mask, and an earlier one's."""
@@ -87,9 +87,9 @@ class Excisor:
 
     def push(self, samples: NDArray[np.complex64]) -> NDArray[np.complex64]:
         """Take the next samples `[n]`; returns those that are ready, valid until the next call."""
-        self.counters["samples_bad"] += self._raw.append(samples)
+        if bad := self._raw.append(samples):
+            self.counters["samples_bad"] += bad
         self._ready = self._blanker.run(self._raw)
-        self.counters["pulses_blanked"] = self._blanker.n_pulses
         parts: list[NDArray[np.complex64]] = []
         while self._cut_lines(parts) if self._is_active else self._look(parts):
             pass
