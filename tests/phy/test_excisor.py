@@ -99,6 +99,43 @@ def test_beside_a_jammer_bursts_are_heard(rng, kind, power_db, settings):
     assert not heard(in_use().receiver().push(x))
 
 
+def at_dc(t):
+    return 10 * np.exp(1j) + 0 * t
+
+
+def leaking(t):
+    """An LO 20 dB stronger than the bursts, 10 Hz off."""
+    return 10 * np.exp(2j * np.pi * 10 * t)
+
+
+def two_that_move(t):
+    """Two tones that swing through the band, and cross."""
+    swing = 2e5 * np.sin(2 * np.pi * 25 * t)
+    phases = [2 * np.pi * np.cumsum(f) / RATE_HZ for f in (1e5 + swing, -1e5 - swing)]
+    return 10 * sum(np.exp(1j * phase) for phase in phases)
+
+
+@pytest.mark.parametrize("hostile", [at_dc, leaking, two_that_move])
+def test_beside_what_is_no_steady_line_bursts_are_heard(rng, hostile):
+    pdus, x = a_stream(rng, 10, 64, 1, 15)
+    x = np.concatenate((noise(rng, SETTLED, 0.03), x))
+    x = (x + hostile(np.arange(len(x)) / RATE_HZ)).astype(np.complex64)
+    assert received(x, in_use().receiver()) == pdus
+
+
+@pytest.mark.parametrize(("length", "n_heard"), [(30, 9), (200, 0)])
+def test_a_jammer_of_preambles_leaves_nothing_behind(rng, length, n_heard):
+    """A short pulse in each of ten preambles is blanked; one as long as they are is not."""
+    pdus, x = a_stream(rng, 20, 64, 1, 15)
+    every = (len(x) - 3000) // 20
+    for begin in range(800, 10 * every, every):
+        x[begin : begin + length] += noise(rng, length, 100)
+    got = received(np.concatenate((noise(rng, SETTLED, 0.03), x)), in_use().receiver())
+    assert set(got) <= set(pdus)
+    assert len(set(got) & set(pdus[:10])) >= n_heard
+    assert got[-9:] == pdus[-9:]
+
+
 @pytest.mark.parametrize("engine", ["in use", "reference"])
 def test_subcarriers_that_were_cut_in_the_preamble_come_back(rng, engine):
     """A sweep is somewhere else with each burst, and at the edge of the band with some."""
