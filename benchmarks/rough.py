@@ -6,6 +6,7 @@ Bursts are impaired as `benchmarks.trials` says. A share of lost PDUs meets its 
 
 import sys
 from collections.abc import Iterator
+from itertools import islice
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -97,6 +98,8 @@ def _rows(seed: int, quick: bool) -> Iterator[Row]:
                 row.peers["liquid-dsp g2412"] = _liquid_jammed(jammed, seed)
         yield row
     yield _penalty(seed, quick)
+    for profile in ("tdl-a", "tdl-c"):
+        yield _clean_penalty(profile, seed, quick)
     for mcs, louder_db, target in ((QPSK12, 10, 0.97), (QAM64_34, 20, 0.9)):
         yield _second_burst(mcs, louder_db, target, seed, quick)
     for louder_db in (0, -6):
@@ -263,6 +266,24 @@ def _penalty(seed: int, quick: bool) -> Row:
         needed.append(float(np.interp(2.0, -logs[-2:], places[-2:])))
     note = f"{needed[0]:.2f} dB without, {needed[1]:.2f} dB with; 64 B, QPSK 1/2"
     return Row("cw_penalty_db", needed[1] - needed[0], "dB", 0.5, "less", n, note=note)
+
+
+def _clean_penalty(profile: str, seed: int, quick: bool) -> Row:
+    """How many more bursts are lost behind the excisor where there is no jammer, but echoes."""
+    air, n = Air(5e6, profile=profile), 300 if quick else 3000
+    excisor, receivers = Excisor(), (Receiver(), Receiver())
+    receivers[1].cuts = excisor.cuts
+    heard: tuple[set[bytes], set[bytes]] = (set(), set())
+    sent: set[bytes] = set()
+    for pdus, x in islice(bursts(air, QAM64_34, 220, SNR_DB, seed), n):
+        sent.update(pdus)
+        for receiver, each, got in zip(receivers, (x, excisor.push(x)), heard, strict=True):
+            got.update(event.data for event in receiver.push(each) if isinstance(event, PduHeard))
+    heard[1].update(_heard(receivers[1], excisor.flush()))
+    lost = [len(sent - each) for each in heard]
+    note = f"{lost[0]} of {n} lost without the excisor, {lost[1]} behind it; 64QAM 3/4, 25 dB"
+    name = f"excisor_clean_{profile}_lost_more"
+    return Row(name, (lost[1] - lost[0]) / n, "share", 0.001, "less", n, note=note)
 
 
 def _busy_beside_a_tone(seed: int) -> Row:

@@ -121,6 +121,7 @@ class Excisor:
         self._raw.restart(first)
         self._raw.append(np.zeros(index - first, np.complex64))
         self._memory.content.tail[:] = 0
+        self._memory.content.held[:] = 0
         self._blanker.restart(first)
         self._at = self._ready = index
         self._next = first if self._is_active else first + 2 * STRIDE

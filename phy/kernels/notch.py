@@ -15,9 +15,9 @@ from phy.kernels.medians import median
 from phy.kernels.openers import open_notch
 from phy.sizes import N_LANES
 from phy.tables.block import PackedArguments
-from phy.tables.notch import LINE_DB, MOST_CUT, SIZE, STRIDE, NotchMemory
+from phy.tables.notch import CLOSE, DC_BACK, LINE_DB, MOST_CUT, SEED_DB, SIZE, STRIDE, NotchMemory
 
-_LINE = 10 ** (LINE_DB / 10)
+_SEED, _LINE = 10 ** (SEED_DB / 10), 10 ** (LINE_DB / 10)
 # A window whose strongest bin has less than this times the mean of all has no line.
 _EVEN = 10.0
 
@@ -36,10 +36,14 @@ def find_lines(
     """
     memory = open_notch(memory_in)
     swapped = _spectra(x, n, apart, memory)
+    found = -1
     for lane in range(n):
+        memory.held[:] = 0
         if _judge(lane, swapped, memory, cut[lane]) > 0:
-            return lane
-    return -1
+            found = lane
+            break
+    memory.held[:] = 0
+    return found
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -53,9 +57,9 @@ def cut_lines(
 ) -> None:
     """Write the first halves of `n` ≤ 8 windows of `x`, STRIDE apart, to `out`, without lines.
 
-    DC goes, too, and with it a line that is too near to 0 to be told from it. `cut` `[8, SIZE]`
-    gets 1 for each bin that was cut, `found` `[8]` how many there are in each window; −1: too many,
-    and none was cut.
+    With lines and soon after them, DC goes, too, and with it a line too near to 0 to be told from
+    it. `cut` `[8, SIZE]` gets 1 for each bin that was cut, `found` `[8]` how many there are in each
+    window; −1: too many, and none was cut.
     """
     memory = open_notch(memory_in)
     swapped = _spectra(x, n, STRIDE, memory)
@@ -68,6 +72,15 @@ def cut_lines(
             for k in range(SIZE):
                 if cut[lane, k]:
                     re[N_LANES * k + lane] = im[N_LANES * k + lane] = 0
+            memory.quiet[0] = 0
+        elif memory.quiet[0] < DC_BACK:
+            memory.quiet[0] += 1
+        else:
+            mean_re, mean_im = memory.square[2 * N_LANES + lane], memory.square[3 * N_LANES + lane]
+            for k in range(SIZE):
+                c, d = memory.constant[0, k], memory.constant[1, k]
+                re[N_LANES * k + lane] += mean_re * c - mean_im * d
+                im[N_LANES * k + lane] += mean_re * d + mean_im * c
     # An FFT with both parts exchanged is the inverse, times SIZE.
     if transform(im, re, to_im, to_re, SIZE, memory.twiddles):
         re, im = to_re, to_im
@@ -86,8 +99,8 @@ def cut_lines(
 def _spectra(x: NDArray[np.complex64], n: int, apart: int, memory: NotchMemory) -> bool:
     """Write the windows' spectra to the planes; True: to the second pair.
 
-    They are without DC, which is no line: a receiver takes it out by itself. `square` gets the sum
-    of each window's powers, and behind these the largest of each.
+    They are without DC, which is no line: a receiver takes it out by itself. `square` gets, for
+    each window, the sum of its powers, the largest, and the real and the imaginary part of its DC.
     """
     planes, square, window, weights = memory.planes, memory.square, memory.window, memory.weights
     flat, constant = x.view(np.float32), memory.constant
@@ -122,6 +135,8 @@ def _spectra(x: NDArray[np.complex64], n: int, apart: int, memory: NotchMemory) 
         sums, largest = sums + power, most(largest, power)
     store(square, 0, sums)
     store(square, N_LANES, largest)
+    store(square, 2 * N_LANES, mean_re)
+    store(square, 3 * N_LANES, mean_im)
     return swapped
 
 
@@ -131,19 +146,43 @@ def _judge(lane: int, swapped: bool, memory: NotchMemory, cut: NDArray[np.uint8]
     power, mean = memory.power, float(memory.square[lane]) / SIZE
     cut[:] = 0
     if not memory.square[N_LANES + lane] > _EVEN * mean:
+        memory.held[:] = 0
         return 0
     planes = memory.planes
     re, im = (planes[2], planes[3]) if swapped else (planes[0], planes[1])
     for k in range(SIZE):
         a, b = re[N_LANES * k + lane], im[N_LANES * k + lane]
         power[k] = a * a + b * b
-    limit, n = np.float32(_LINE * median(power, mean)), 0
+    middle = median(power, mean)
+    seed, limit = np.float32(_SEED * middle), np.float32(_LINE * middle)
     for k in range(SIZE):
-        if power[k] > limit:
-            cut[k] = cut[(k + 1) % SIZE] = cut[k - 1] = 1
+        if power[k] > seed or (power[k] > limit and memory.held[k]):
+            _spread(k, 1, limit, power, cut)
+            _spread(k, -1, limit, power, cut)
+    n = 0
     for k in range(SIZE):
-        n += cut[k]
+        with_neighbors = cut[k - 1] | cut[k] | cut[(k + 1) % SIZE]
+        memory.held[k] = with_neighbors
+        n += with_neighbors
     if n > MOST_CUT:
         cut[:] = 0
+        memory.held[:] = 0
         return -1
+    for k in range(SIZE):
+        cut[k] = memory.held[k]
     return n
+
+
+@step
+def _spread(
+    k: int, way: int, limit: float, power: NDArray[np.float32], cut: NDArray[np.uint8]
+) -> None:
+    """Mark a line at bin `k`, and others close to it, from one to the next."""
+    cut[k], gap = 1, 0
+    for _ in range(SIZE):
+        k = (k + way) % SIZE
+        gap += 1
+        if cut[k] or gap > CLOSE:
+            return
+        if power[k] > limit:
+            cut[k], gap = 1, 0

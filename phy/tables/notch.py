@@ -13,13 +13,19 @@ SIZE = 512
 """Samples of a window, and bins of its spectrum."""
 STRIDE = SIZE // 2
 """Samples from one window to the next. Each sample is in two windows."""
+SEED_DB = 22.0
+"""A bin this far above the median of its window is a line. Echoes do not lift a burst so far."""
 LINE_DB = 14.0
-"""A bin this far above the median of its window is a line, and is cut with its neighbors."""
+"""So is one this far above it, if one close to it is a line, or was in the window before."""
+CLOSE = 8
+"""Bins that lines may be apart to count as close."""
+DC_BACK = 32
+"""DC is left in windows if there was no line in so many. Else a line near DC would go and come."""
 MOST_CUT = 3 * SIZE // 8
 """Where more bins than these would be cut, nothing is: what is left would be no signal."""
 
 
-@block_of("f4[1] f4[1] f4[2] f4[2] f4[2] f4[1] f4[1] f4[2]")
+@block_of("f4[1] f4[1] f4[2] f4[2] f4[2] f4[1] f4[1] f4[2] u1[1] i8[1]")
 class NotchMemory(NamedTuple):
     """What the notch keeps from call to call, and its working memory."""
 
@@ -39,6 +45,10 @@ class NotchMemory(NamedTuple):
     """Eight by eight values to transpose."""
     tail: Planes
     """Second half of the last window, as it was left `[2, STRIDE]`."""
+    held: NDArray[np.uint8]
+    """1 for bins that were cut in the last window `[SIZE]`."""
+    quiet: NDArray[np.int64]
+    """Number of windows since the last one with lines `[1]`."""
 
 
 def new_notch_memory() -> ArgumentBlock[NotchMemory]:
@@ -57,5 +67,7 @@ def new_notch_memory() -> ArgumentBlock[NotchMemory]:
             power=np.empty(SIZE, np.float32),
             square=np.empty(N_LANES * N_LANES, np.float32),
             tail=np.zeros((2, STRIDE), np.float32),
+            held=np.zeros(SIZE, np.uint8),
+            quiet=np.full(1, DC_BACK),
         )
     )

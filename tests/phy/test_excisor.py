@@ -13,6 +13,8 @@ from phy import (
     EnergyDetector,
     Excisor,
     Jammer,
+    Path,
+    PathParams,
     Transmitter,
     pulse,
     reference,
@@ -63,21 +65,45 @@ def a_stream(rng, n, size, mcs, snr_db, grid=GRID):
     return pdus, noisy(rng, np.concatenate((*parts, silence(3000))), snr_db)
 
 
+@pytest.mark.parametrize("profile", ["awgn", "rayleigh", "tdl-a", "tdl-c"])
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
-def test_in_clean_air_hardly_anything_is_cut(rng, grid):
-    """Each window is looked at, not only those that an excisor without lines looks at."""
-    n, cut, found, n_windows, cuts = 8, np.zeros((8, SIZE), np.uint8), np.zeros(8, int), 0, []
+def test_in_clean_air_hardly_anything_is_cut(rng, grid, profile):
+    """Each window is looked at, not only those that an excisor without lines looks at.
+
+    Echoes lift a part of the spectrum, and leave holes in another; that makes no lines of it.
+    """
+    n, cut, found, n_windows, n_cut = 8, np.zeros((8, SIZE), np.uint8), np.zeros(8, int), 0, 0
+    n_blanked = 0
     for mcs in MCS_TABLE:
         for snr_db in (0, 10, 40):
-            _, x = a_stream(rng, 2, 400, mcs.index, snr_db, grid)
+            waves = [Transmitter(grid=grid).modulate([rng.bytes(200)], mcs.index) for _ in range(4)]
+            air = PathParams(rate_hz=5e6, profile=profile, delay_spread_s=1e-7)
+            x = np.concatenate([np.pad(Path(air, rng).carry(wave)[1], 200) for wave in waves])
+            x = noisy(rng, x.astype(np.complex64), snr_db)
+            n_blanked += blanked(x)
             memory, out = new_notch_memory(), np.empty(n * STRIDE, np.complex64)
             for begin in range(0, len(x) - (n + 1) * STRIDE, n * STRIDE):
                 piece = x[begin : begin + (n + 1) * STRIDE]
                 compute.cut_lines(piece, n, memory, out, cut, found)
                 n_windows += n
-                cuts += found[found != 0].tolist()
-    assert len(cuts) <= 0.01 * n_windows
-    assert set(cuts) <= {3}
+                n_cut += np.count_nonzero(found)
+    assert n_cut <= 0.003 * n_windows
+    assert n_blanked == 0
+
+
+def test_windows_without_lines_are_left_as_they_are(rng):
+    """Even their DC, once the lines are long gone: it has a part of what is near it."""
+    _, x = a_stream(rng, 5, 400, 9, 40)
+    memory, n = new_notch_memory(), 8
+    out, cut, found = (
+        np.empty(n * STRIDE, np.complex64),
+        np.zeros((8, SIZE), np.uint8),
+        np.zeros(8, int),
+    )
+    for begin in range(0, len(x) - (n + 1) * STRIDE, n * STRIDE):
+        compute.cut_lines(x[begin : begin + (n + 1) * STRIDE], n, memory, out, cut, found)
+        got, whole = out[STRIDE if begin == 0 else 0 :], x[begin : begin + n * STRIDE]
+        assert np.allclose(got, whole[-len(got) :], atol=1e-4)
 
 
 @pytest.mark.parametrize(
