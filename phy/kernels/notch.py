@@ -175,7 +175,7 @@ def _judge(lane: int, swapped: bool, memory: NotchMemory, cut: NDArray[np.uint8]
 
 @step
 def _spread(
-    k: int, way: int, limit: float, power: NDArray[np.float32], cut: NDArray[np.uint8]
+    k: int, way: int, limit: np.float32, power: NDArray[np.float32], cut: NDArray[np.uint8]
 ) -> None:
     """Mark a line at bin `k`, and others close to it, from one to the next."""
     cut[k], gap = 1, 0

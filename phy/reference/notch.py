@@ -41,7 +41,7 @@ def cut_lines(
             y = window * np.fft.ifft(np.where(cut[i], 0, spectrum))
         else:
             # With its DC.
-            y = window**2 * x[i * STRIDE : i * STRIDE + SIZE]
+            y = np.asarray(window**2 * x[i * STRIDE : i * STRIDE + SIZE], np.complex128)
         out[i * STRIDE : (i + 1) * STRIDE] = y[:STRIDE] + (memory.tail[0] + 1j * memory.tail[1])
         memory.tail[:] = y[STRIDE:].real, y[STRIDE:].imag
 
