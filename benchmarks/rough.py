@@ -39,7 +39,7 @@ class _Jammed(NamedTuple):
     kind: Literal["tone", "narrow", "sweep", "pulses"]
     power_db: float
     n_tones: int
-    target: float
+    target: float | None
     mcs: int = QPSK12
     n_bytes: int = 64
     snr_db: float = 15.0
@@ -55,6 +55,7 @@ _JAMMED = (
     _Jammed("sweep_10ms_lost_10db_220B_25db", "sweep", 10, 1, 0.005, QPSK12, 220, 25.0),
     _Jammed("pulses_2pct_lost_0db", "pulses", 0, 1, 0.02),
     _Jammed("pulses_2pct_lost_10db", "pulses", 10, 1, 0.03),
+    _Jammed("pulses_2pct_0db_64qam34_220B_25db", "pulses", 0, 1, None, QAM64_34, 220, 25.0),
     _Jammed("cw_20db_64qam34_220B_25db", "tone", 20, 1, 0.015, QAM64_34, 220, 25.0),
     _Jammed("three_tones_10db_64qam34_220B_25db", "tone", 10, 3, 0.05, QAM64_34, 220, 25.0),
 )
@@ -105,6 +106,8 @@ def _rows(seed: int, quick: bool) -> Iterator[Row]:
     for louder_db in (0, -6):
         yield _after_truncated(louder_db, seed, quick)
     yield _busy_beside_a_tone(seed)
+    for rate_hz in (1e6, 5e6):
+        yield _deaf_at_onset(rate_hz, seed)
     for step_db in (-3.0, -6.0):
         yield _step(step_db, seed, quick)
     yield _false_pdus(seed, 10**6 if quick else 10**9)
@@ -336,6 +339,27 @@ def _heard_share(name: str, heard: int, n: int, target: float, note: str, quick:
     return Row(name, value, "share", target, "more", n, note=f"{heard} of {n} heard; {note}")
 
 
+def _deaf_at_onset(rate_hz: float, seed: int) -> Row:
+    """How long after a tone begins a robot beside it hears nothing, at the worst."""
+    rng, transmitter, worst = np.random.default_rng(seed), Transmitter(), 0
+    for _ in range(30):
+        begin = int(rng.integers(20_000, 60_000))
+        tone = Jammer("tone", 20, _JAMMED_HZ, seed, offset_hz=1e5, times=[(begin / _JAMMED_HZ, 1)])
+        receiver, excisor, x = Receiver(), Excisor(), _noise(rng, begin + 60_000, 0.03)
+        for at in range(100, len(x) - 2000, 1900):
+            burst = transmitter.modulate([rng.bytes(64)], QPSK12)
+            x[at : at + len(burst)] += burst
+        receiver.cuts = excisor.cuts
+        events = receiver.push(excisor.push(tone.add(x, 0)))
+        # A burst that had begun before it may still be heard.
+        ends = [each.at for each in events if isinstance(each, PduHeard)]
+        worst = max(worst, min((at for at in ends if at > begin + 2000), default=len(x)) - begin)
+    name = f"deaf_at_onset_of_a_tone_ms_{rate_hz * 1e-6:.0f}msps"
+    return Row(
+        name, 1e3 * worst / rate_hz, "ms", 50, "less", 30, note="20 dB stronger; 64 B, QPSK 1/2"
+    )
+
+
 def _step(step_db: float, seed: int, quick: bool) -> Row:
     """Bursts of four PDUs with a step of gain anywhere in the payload."""
     rng, transmitter, receiver = np.random.default_rng(seed), Transmitter(), Receiver()
@@ -352,7 +376,7 @@ def _step(step_db: float, seed: int, quick: bool) -> Row:
     return _lost(name, ErrorRate(4 * n, errors), 0.01, note, quick)
 
 
-def _lost(name: str, lost: ErrorRate, target: float, note: str, quick: bool) -> Row:
+def _lost(name: str, lost: ErrorRate, target: float | None, note: str, quick: bool) -> Row:
     note = f"{lost.errors} of {lost.n} lost; {note}"
     value = lost.share if quick else lost.bound
     return Row(name, value, "share", target, "less", lost.n, note=note)

@@ -57,7 +57,7 @@ class Excisor:
         self._blanker = Blanker(self.counters)
         self._is_active = False
         self._seen: tuple[NDArray[np.complex64], NDArray[np.uint8], NDArray[np.uint8]] | None = None
-        """A window with lines, its mask, and an earlier one's."""
+        """While it acts: a window with lines, its mask, and an earlier one's."""
         self._look_again = 0
         self._restart(start)
 
@@ -70,7 +70,7 @@ class Excisor:
     def lines(self) -> list[Line]:
         """What is cut now, the strongest first; may be read from any thread."""
         seen = self._seen
-        if seen is None or not self._is_active:
+        if seen is None:
             return []
         x, mask, earlier = seen
         powers = np.abs(np.fft.fft((x - x.mean()) * self._memory.content.window)) ** 2
@@ -161,7 +161,7 @@ class Excisor:
         for i in range(n):
             self._note(self._next // STRIDE + i, i, x)
             if self._n_clean == RELEASE:
-                self._is_active, n = False, i + 1
+                self._is_active, self._seen, n = False, None, i + 1
                 break
         ready = self._next + n * STRIDE
         if ready > self._at:

@@ -220,7 +220,7 @@ class Receiver:
     def _search(self, _: list[Event]) -> bool:
         """Slide the metric over whole hops of samples, up to the first crossing."""
         # The bound moves the position, too.
-        until = self._searchable() if self._bursts or self._explained else self._stream.end
+        until = self._searchable()
         n_hops = (until - self._at) // HOP
         if n_hops < 1:
             return False
@@ -335,12 +335,13 @@ class Receiver:
             if self._stream.end < burst.need:
                 return False
             burst.take(self._stream, self._demodulator, self._powers, self.cuts, self.on_points)
-        is_alone = len(self._bursts) == 1 and self._state is State.SEARCH
-        quality, n_pdus, begin = burst.acquired.quality, burst.plan.n_pdus, burst.judged
-        n_good, until = burst.n_good, begin - 1
-        number = n_good + burst.n_bad
         if not burst.decoded:
             return True
+        is_alone = len(self._bursts) == 1 and self._state is State.SEARCH
+        quality, n_pdus, begin = burst.acquired.quality, burst.plan.n_pdus, burst.judged
+        # What the good ones explain; so far, nothing.
+        n_good, until = burst.n_good, begin - 1
+        number = n_good + burst.n_bad
         while burst.decoded:
             data, end, plain_until, is_gone = burst.decoded.popleft()
             number += 1
@@ -360,10 +361,7 @@ class Receiver:
         self.counters["pdus_bad"] += data is None
         burst.n_good, burst.n_bad = n_good, number - n_good
         if until >= begin:
-            if is_alone and self._at + HOP > begin:
-                self._at = max(self._at, until)
-            else:
-                self._explained.append((begin, until))
+            self._explained.append((begin, until))
         if is_last:
             self._end(burst, events, "whole")
         elif is_gone:

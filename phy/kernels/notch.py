@@ -38,10 +38,10 @@ def find_lines(
     swapped = _spectra(x, n, apart, memory)
     found = -1
     for lane in range(n):
-        memory.held[:] = 0
         if _judge(lane, swapped, memory, cut[lane]) > 0:
             found = lane
             break
+    # Of windows so far apart, none continues another.
     memory.held[:] = 0
     return found
 

@@ -72,30 +72,22 @@ class Payload:
         limit = first - first % SLIP_EVERY + SLIP_EVERY
         return min(self.plan.symbols_through(self.n_done + 1), limit)
 
-    def take_next(
-        self, stream: NDArray[np.complex64], start: int, cuts: Cuts | None
-    ) -> Subcarriers:
-        """Process the symbols up to `need` of a stream from index `start` on."""
-        x = stream[self.window(self.n_symbols_in) - start : self.need - start]
-        return self.take(x, self._dc, self._next - self.n_symbols_in, cuts)
-
     def take(
-        self, samples: NDArray[np.complex64], dc: complex, n: int, cuts: Cuts | None = None
+        self, stream: NDArray[np.complex64], start: int, cuts: Cuts | None = None
     ) -> Subcarriers:
-        """Process the next `n` symbols, from the first FFT window on; returns their points."""
+        """Process the symbols up to `need` of a stream from index `start` on; returns points."""
         found, grid, first = self.acquired, self._grid, self.n_symbols_in
+        windows = self.window(first) + grid.n_symbol * np.arange(self._next - first)
         origin = self.window(first) - found.origin
-        starts = grid.n_symbol * np.arange(n)
-        y = to_subcarriers(samples, starts, found.frequency, dc, grid, origin)
+        x = stream[self.window(first) - start : self.need - start]
+        y = to_subcarriers(x, windows - windows[0], found.frequency, self._dc, grid, origin)
         self._powers += np.mean(np.abs(y) ** 2, axis=1).tolist()
-        kept = None
-        if cuts is not None:
-            kept = cuts.kept(self.window(first) + starts, found.frequency, grid)
+        kept = None if cuts is None else cuts.kept(windows, found.frequency, grid)
         llr, points = found.equaliser.equalise(
             y, self._n_header + first, self.plan.mcs.modulation, kept
         )
         self._llr = np.concatenate((self._llr, llr))
-        self.n_symbols_in += n
+        self.n_symbols_in += len(windows)
         return points
 
     def is_next_in(self) -> bool:

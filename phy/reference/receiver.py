@@ -272,7 +272,7 @@ class Receiver:
         """Process the symbols up to the end of a PDU, and report that PDU."""
         if self.next_index < burst.need:
             return False
-        points = burst.take_next(self._samples, self._first, self.cuts)
+        points = burst.take(self._samples, self._first, self.cuts)
         if self._on_points is not None:
             self._on_points(points.astype(np.complex64), burst.plan.mcs.modulation)
         lacks_power = False

@@ -74,22 +74,29 @@ def test_no_sample_of_a_good_burst_is_searched_again(rng, mcs, n_bytes):
     assert not counters["samples_searched_again"]
 
 
-def test_a_flood_of_headers_inside_of_bursts_is_no_denial(rng):
-    """Valid headers of our own network and length, as loud as the bursts, promise long bursts."""
+@pytest.mark.parametrize("promise_db", [-10, 0, 6])
+def test_a_flood_of_headers_is_no_denial(rng, promise_db):
+    """Valid headers of our own network and length promise long bursts, in bursts and in pauses.
+
+    What they lie on is lost if they are loud. Everything else is heard.
+    """
     expected = Expected(SIZE, longest=20_000, every=10_000)
     promise = Transmitter().modulate(payloads(rng, 8, SIZE), 1)[: HEADER + 64]
-    x, sent, at = silence(600_000), [], 1000
+    x, spared, at = silence(600_000), [], 1000
     while at < len(x) - 20_000:
-        pdus = payloads(rng, 4, SIZE)
+        pdus = payloads(rng, 6, SIZE)
         burst = Transmitter().modulate(pdus, 1)
         x[at : at + len(burst)] += burst
-        sent += pdus
-        # One in each pause, and one as far as it can be in what is no PDU of ours any more.
-        place = at + len(burst) + 40
-        x[place : place + len(promise)] += promise
-        at = place + len(promise) + int(rng.integers(40, 900))
-    events, counters = received(noisy(rng, x, 20), expected=expected)
-    assert len(set(heard(events)) & set(sent)) >= 0.9 * len(sent)
+        ends = at + HEADER + (len(burst) - HEADER) / len(pdus) * np.arange(1, len(pdus) + 1)
+        inside = at + int(rng.integers(HEADER + 200, len(burst) - len(promise)))
+        behind = at + len(burst) + 40
+        for place in (inside, behind):
+            x[place : place + len(promise)] += np.float32(10 ** (promise_db / 20)) * promise
+        is_spared = (ends < inside) | (np.r_[0, ends[:-1]] > inside + len(promise))
+        spared += [pdu for pdu, whole in zip(pdus, is_spared, strict=True) if whole]
+        at = behind + len(promise) + int(rng.integers(40, 900))
+    events, counters = received(noisy(rng, x, 25), expected=expected)
+    assert len(set(heard(events)) & set(spared)) >= 0.9 * len(spared)
     assert counters["captures"] > 10
 
 

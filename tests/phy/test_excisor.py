@@ -65,6 +65,13 @@ def a_stream(rng, n, size, mcs, snr_db, grid=GRID):
     return pdus, noisy(rng, np.concatenate((*parts, silence(3000))), snr_db)
 
 
+def blanked(x):
+    """Number of blocks of `x` in which there is a pulse."""
+    n, found = len(x) // BLOCK - 1, np.zeros(len(x) // BLOCK, np.uint8)
+    compute.blank(x.copy(), n, 0.0, np.empty(BLOCK, np.float32), found)
+    return found.sum()
+
+
 @pytest.mark.parametrize("profile", ["awgn", "rayleigh", "tdl-a", "tdl-c"])
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
 def test_in_clean_air_hardly_anything_is_cut(rng, grid, profile):
@@ -273,13 +280,6 @@ def test_the_noise_of_a_coarse_converter_is_no_pulse(rng):
             np.round(x.view(np.float32) * 4 + level * rng.standard_normal(2 * len(x))) / 128
         ).astype(np.float32)
         assert not blanked(x.view(np.complex64))
-
-
-def blanked(x):
-    """Number of blocks of `x` in which there is a pulse."""
-    n, found = len(x) // BLOCK - 1, np.zeros(len(x) // BLOCK, np.uint8)
-    compute.blank(x.copy(), n, 0.0, np.empty(BLOCK, np.float32), found)
-    return found.sum()
 
 
 def test_when_the_pulses_end_all_is_left_again(rng):

@@ -192,7 +192,9 @@ class ModemHere:
             params, call = self._params, self._call
             told = tell if call is None else partial(call, tell)
             grid = phy.GRIDS[params.grid]
-            receiving.observer = Observer(receiver, grid, params.rate_hz, told)
+            receiving.observer = Observer(
+                receiver, grid, params.rate_hz, lambda: receiving.lines, told
+            )
 
     async def close(self) -> None:
         """Close the radio; bursts that have not left are not reported. Closing twice is fine."""

@@ -28,11 +28,12 @@ class Observer:
 
     def __init__(
         self, receiver: "phy.Receiver", grid: phy.Numerology, rate_hz: float,
-        tell: Callable[[AirSeen], object],
+        lines: Callable[[], list[LineSeen]], tell: Callable[[AirSeen], object],
     ) -> None:  # fmt: skip
         self._receiver = receiver
         self._grid = grid
         self._rate_hz = rate_hz
+        self._lines = lines
         self._tell = tell
         self._told_at: int | None = None
         self._bursts: list[BurstSeen] = []
@@ -48,16 +49,14 @@ class Observer:
         """Look no longer."""
         self._receiver.on_points = None
 
-    def take(
-        self, block: RxBlock, events: Sequence[phy.Event], lines: Callable[[], list[LineSeen]]
-    ) -> None:
-        """Take a block, and the events that it completed; `lines` tells what is cut now."""
+    def take(self, block: RxBlock, events: Sequence[phy.Event]) -> None:
+        """Take a block, and the events that it completed."""
         if self._told_at is None:
             self._told_at = block.index
         elif block.index - self._told_at >= PERIOD_S * self._rate_hz:
             # Before this block: the PDUs of the bursts before it have been delivered.
             self._told_at = block.index
-            self._tell(self._gathered(block.index, lines()))
+            self._tell(self._gathered(block.index))
         for event in events:
             if isinstance(event, phy.BurstOver) and len(self._bursts) < MOST_BURSTS:
                 self._bursts.append(self._seen(event))
@@ -67,12 +66,12 @@ class Observer:
             np.maximum(self._most, power, out=self._most)
             self._n += 1
 
-    def _gathered(self, end: int, lines: Sequence[LineSeen]) -> AirSeen:
+    def _gathered(self, end: int) -> AirSeen:
         n_bad = self._receiver.counters["headers_bad"]
         seen = AirSeen(
             end / self._rate_hz, self._rate_hz, self._bursts,
             _levels(self._sum / max(1, self._n)), _levels(self._most),
-            _coordinates(self._points), self._modulation, n_bad - self._n_bad, list(lines),
+            _coordinates(self._points), self._modulation, n_bad - self._n_bad, self._lines(),
         )  # fmt: skip
         self._bursts, self._n, self._n_bad = [], 0, n_bad
         self._sum[:] = self._most[:] = 0

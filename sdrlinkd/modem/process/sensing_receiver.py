@@ -53,7 +53,7 @@ class SensingReceiver:
         if self._sense is not None:
             self.sensed = self._sense_air(self._sense)
         if (observer := self.observer) is not None:
-            observer.take(block, events, lambda: self.lines)
+            observer.take(block, events)
         return events
 
     def flush(self) -> Sequence[phy.Event]:
