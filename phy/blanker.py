@@ -1,4 +1,4 @@
-"""Sets pulses of interference to zero: ignition, radars, other radios that jump by."""
+"""Sets short pulses of interference to zero: of ignition, of radars, of radios that hop."""
 
 from collections import Counter
 

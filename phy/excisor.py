@@ -1,4 +1,4 @@
-"""Takes lines and pulses out of a stream before the search: tones, sweeps, ignition, radars."""
+"""Takes tones, narrow signals, sweeps and short pulses out of a stream before the search."""
 
 import math
 from collections import Counter
@@ -34,7 +34,7 @@ class Line(NamedTuple):
     width: float
     """Share of the band that is cut for it."""
     moves: bool
-    """Whether its frequency was another one a while ago, as of a sweep."""
+    """Whether its frequency has changed since an earlier look, as that of a sweep does."""
 
 
 class Excisor:

@@ -50,7 +50,8 @@ INFO = {
 RUNTIME_DIR = "runtime_dir"
 """Label of sdrlink_up, and of sdrlink_info: so a daemon that is gone still has the robot's id."""
 SKIPPED = ("node", "taken_at_unix_ns", "carrier.lines")
-"""A label of everything; Prometheus has a time of its own; and labels without end, of a sweep."""
+"""The first is a label of everything; Prometheus has a time of its own; a sweep would bring labels
+without end."""
 
 Labels = tuple[tuple[str, str], ...]
 
