@@ -134,7 +134,7 @@ class Forwarding(Generic[T]):
     def due(self, now: float) -> list[T]:
         """The copies that have been held for long enough."""
         found = []
-        while self._held and self.due_at <= now:
+        while self._held and self._held[0][0] <= now:
             _, known = self._held.popleft()
             if known.item is not None:
                 found.append(known.item)

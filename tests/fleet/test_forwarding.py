@@ -164,6 +164,15 @@ def test_who_leads_from_now_on_puts_what_it_held():
     assert forwarding.due(1.0) == []
 
 
+def test_who_leads_from_now_on_may_hold_only_what_others_have_put():
+    forwarding = Forwarding()
+    for number in range(3):
+        forwarding.heard("odom", name_of(number), "a", 0.0, leads=False)
+        forwarding.passed("odom", name_of(number), 0.001, by_leader=True)
+    assert forwarding.lead() == []
+    assert forwarding.due_at == float("inf")
+
+
 @pytest.mark.parametrize("leads", [True, False])
 def test_what_comes_once_more_is_not_put_again(leads):
     forwarding = Forwarding()
