@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from phy import compute, header, ofdm, preamble
 from phy.constellation import Modulation
 from phy.convolutional import N_TAIL
+from phy.cuts import Cuts
 from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.header import BurstHeader
 from phy.header_code import parse_header
@@ -87,29 +88,46 @@ class Acquisition:
         self._room = _new_room(grid)
         self._n_marked = 0
 
-    def leave_out(self, kept: NDArray[np.float32] | None) -> None:
-        """Leave subcarriers out of the next symbols that are 0 in `kept` `[n, n_used]`."""
-        rows = self._channel.content.kept
-        rows[: self._n_marked] = 1
+    def leave_out(
+        self, kept: NDArray[np.float32] | None, whole: NDArray[np.float32] | None = None
+    ) -> None:
+        """Leave subcarriers out of the next symbols that are 0 in `kept` `[n, n_used]`.
+
+        `whole` `[n]` is the share of each symbol's samples that were not blanked; None: all.
+        """
+        channel = self._channel.content
+        channel.kept[: self._n_marked] = channel.whole[: self._n_marked] = 1
         self._n_marked = 0
         if kept is not None:
             self._n_marked = len(kept)
-            rows[: self._n_marked, : self._grid.n_used] = kept[:, self._grid.tones]
-
-    def leave_out_always(self, kept: NDArray[np.float32] | None) -> None:
-        """Leave subcarriers out of training and header that are 0 in any row of `kept`."""
-        n = header.n_symbols(self._grid)
-        self.leave_out(None if kept is None else np.tile(kept.min(0), (n, 1)))
+            channel.kept[: len(kept), : self._grid.n_used] = kept[:, self._grid.tones]
+        if whole is not None:
+            self._n_marked = len(whole)
+            channel.whole[: len(whole)] = whole
 
     def acquire(
-        self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex
+        self,
+        x: NDArray[np.complex64],
+        base: int,
+        coarse: float,
+        dc: complex,
+        cuts: Cuts | None = None,
     ) -> Acquired | Missed:
         """Read the burst whose first long symbol is nominally at `x[before(grid)]`.
 
         `base` is the absolute index of `x[0]`; `coarse` is the frequency of the detector's peak, in
-        cycles per sample, modulo 1/16.
+        cycles per sample, modulo 1/16. `cuts` is what an excisor took out.
         """
         grid, room = self._grid, self._room.content
+        windows = self._training.content.windows
+        if cuts is not None:
+            starts = np.arange(base + self._nominal, base + len(x), grid.n_fft)
+            kept = cuts.kept(starts, coarse, grid)
+            # A subcarrier that is cut anywhere is left out of training and header.
+            always = None if kept is None else np.tile(kept.min(0), (header.n_symbols(grid), 1))
+            # About where the header is: it need not be known better.
+            about = base + self._nominal - windows[0] + windows[preamble.N_LONG :]
+            self.leave_out(always, cuts.whole(about, grid))
         start, frequency = compute.acquire(
             x, self._nominal, coarse, dc, self._centre_cycles,
             self._training, self._tones, self._axes,
@@ -120,6 +138,8 @@ class Acquisition:
         told = parse_header(room.octets, room.folded)
         if told is None:
             return Missed("header")
+        if cuts is not None:
+            self.leave_out(always, cuts.whole(base + start - BACKOFF + windows, grid))
         snr_db, rssi_dbfs, evm_db = compute.settle(
             _sent(told, grid), self._training, self._tones,
             self._channel, self._scratch, self._room,

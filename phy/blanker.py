@@ -5,6 +5,7 @@ from collections import Counter
 import numpy as np
 
 from phy import compute
+from phy.cuts import Cuts
 from phy.stream import SampleStream
 from phy.tables.blanking import BLOCK, WINDOW
 
@@ -26,10 +27,10 @@ class Blanker:
     RELEASE blocks without one.
     """
 
-    def __init__(self, counters: Counter[str]) -> None:
+    def __init__(self, counters: Counter[str], cuts: Cuts) -> None:
         self.is_active = False
         """Whether samples have to wait for those behind them."""
-        self._counters = counters
+        self._counters, self._cuts = counters, cuts
         self._power = np.empty(BLOCK, np.float32)
         self._found = np.zeros(_AT_ONCE, np.uint8)
         self._before = 0.0
@@ -74,6 +75,8 @@ class Blanker:
         self._before = compute.blank(x, n, self._before, self._power, self._found)
         pulses = np.flatnonzero(self._found[:n])
         self._counters["pulses_blanked"] += len(pulses)
+        for i in pulses.tolist():
+            self._cuts.blank(self._next // BLOCK + i, x[i * BLOCK : (i + 1) * BLOCK] == 0)
         self._n_clean = n - 1 - int(pulses[-1]) if len(pulses) else self._n_clean + n
         self.is_active = self._n_clean < RELEASE
         self._next += n * BLOCK

@@ -38,6 +38,7 @@ class Demodulator:
         first_symbol: int,
         llr: NDArray[np.int16],
         powers: NDArray[np.float32],
+        hidden: NDArray[np.float64],
         points: NDArray[np.complex64] | None = None,
     ) -> float:
         """Write the LLRs of OFDM symbols, in the code's order, to `llr` `[n · n_data · bits]`.
@@ -45,7 +46,9 @@ class Demodulator:
         The first symbol's FFT window begins with `samples`. They have rotated by `frequency` cycles
         per sample, starting `origin` samples earlier. The header's first symbol is number 0.
         `channel` is updated. `powers` `[≥ n]` gets each symbol's mean power on a subcarrier;
-        `points` `[n, n_data]`, if given, gets the equalised points. Returns the largest power.
+        `hidden` `[≥ n]` gets the bits on a subcarrier that interference hid, of all symbols up to
+        each; `points` `[n, n_data]`, if given, gets the equalised points. Returns the largest
+        power.
         """
         grid = self._grid
         n = (len(samples) - grid.n_fft) // grid.n_symbol + 1
@@ -53,7 +56,7 @@ class Demodulator:
         loudest: float = compute.demodulate(
             samples, n, frequency, dc, origin, first_symbol,
             tones(grid), axes(modulation, grid), channel, self._scratch,
-            to, llr, powers,
+            to, llr, powers, hidden,
         )  # fmt: skip
         return loudest
 

@@ -41,6 +41,8 @@ def new_channel(grid: Numerology) -> ArgumentBlock[Channel]:
             tracking=np.zeros((2, 5)),
             missed=np.zeros((2, len(tones(grid).content.pilots))),
             kept=np.ones((SLIP_EVERY, width), np.float32),
+            whole=np.ones(SLIP_EVERY, np.float32),
+            trust=np.ones(SLIP_EVERY, np.float32),
         )
     )
 

@@ -54,7 +54,7 @@ class Excisor:
         self._found = np.zeros(N_LANES, np.int64)
         self._room = np.empty(N_LANES * STRIDE, np.complex64)
         self._raw = SampleStream(start, 1 << 16)
-        self._blanker = Blanker(self.counters)
+        self._blanker = Blanker(self.counters, self.cuts)
         self._is_active = False
         self._seen: tuple[NDArray[np.complex64], NDArray[np.uint8], NDArray[np.uint8]] | None = None
         """While it acts: a window with lines, its mask, and an earlier one's."""

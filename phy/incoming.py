@@ -15,6 +15,7 @@ from phy.demodulation import Demodulator, PduDecoder
 from phy.estimation import tones
 from phy.layout import BurstLayout
 from phy.numerology import Numerology
+from phy.quality import snr_of_llrs
 from phy.sizes import SLIP_EVERY
 from phy.stream import SampleStream
 from phy.tables.burst import GAIN, N_FOLLOWED, N_ODD, NO, SLOPE, TURNS
@@ -43,10 +44,11 @@ class Place:
         self.n_header = header.n_symbols(grid)
 
 
-Decoded = tuple[bytes | None, int, int, bool]
-"""A PDU whose symbols are in, or None if its CRC-32 is wrong; absolute indices; whether it is gone.
+Decoded = tuple[bytes | None, int, int, bool, float]
+"""A PDU whose symbols are in, or None if its CRC-32 is wrong; absolute indices; whether it is gone;
+the SNR of its LLRs.
 
-They are the index after its last symbol; and the one where the power begins to be more than the
+The indices are that after its last symbol; and the one where the power begins to be more than the
 burst's, or again the end. It is gone if it lacks the power of the burst.
 """
 
@@ -96,6 +98,7 @@ class IncomingBurst:
         stream: SampleStream,
         demodulator: Demodulator,
         powers: NDArray[np.float32],
+        hidden: NDArray[np.float64],
         cuts: Cuts | None,
         on_points: OnPoints | None,
     ) -> None:
@@ -105,7 +108,8 @@ class IncomingBurst:
         begin, n = self.at, last - first
         if cuts is not None:
             starts = begin + self._n_symbol * np.arange(n)
-            self.place.acquisition.leave_out(cuts.kept(starts, found.frequency, self._grid))
+            kept = cuts.kept(starts, found.frequency, self._grid)
+            self.place.acquisition.leave_out(kept, cuts.whole(starts, self._grid))
         points = None
         if on_points is not None:
             points = np.empty((n, self._grid.n_data), np.complex64)
@@ -119,12 +123,13 @@ class IncomingBurst:
             self.place.n_header + first,
             self.place.decoder.room(n),
             powers,
+            hidden,
             points,
         )
         if on_points is not None and points is not None:
             on_points(points, plan.mcs.modulation)
         number, own_from = self.n_good + self.n_bad, first
-        is_loud = loudest > self._loud
+        is_loud, snr_db, hid = loudest > self._loud, found.quality.snr_db, 0.0
         for data in self.place.decoder.decode(n_pdus):
             number += 1
             through = plan.symbols_through(number)
@@ -140,7 +145,10 @@ class IncomingBurst:
                 loud = np.flatnonzero(powers[own_from - first : through - first] > self._loud)
                 if len(loud):
                     plain_until = min(plain_until, self._end_of(own_from + int(loud[0]) - 1))
-            self.decoded.append((data, end, plain_until, is_gone))
+            if through > own_from:
+                before, hid = hid, hidden.item(through - first - 1)
+                snr_db = snr_of_llrs(found.quality.snr_db, (hid - before) / (through - own_from))
+            self.decoded.append((data, end, plain_until, is_gone, snr_db))
             own_from = through
         self.n_symbols_in = last
         if last == self._limit:

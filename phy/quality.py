@@ -1,7 +1,12 @@
 """The events that a receiver reports, and the names of its counters."""
 
+import math
 from math import inf
 from typing import NamedTuple
+
+_LEAST_SNR = 1e-6
+_BY_CHANCE = 0.25
+"""Pilots that differ by chance, or as peaks were clipped, seem to hide so many bits: 0.75 dB."""
 
 
 class BurstQuality(NamedTuple):
@@ -38,6 +43,8 @@ class PduHeard(NamedTuple):
     number: int
     at: int
     burst: BurstQuality
+    snr_db: float
+    """SNR that its LLRs had: that of the burst, less what interference hid; see `snr_of_llrs`."""
     doppler: float | None = None
 
 
@@ -65,6 +72,20 @@ class Claim(NamedTuple):
 
 
 Event = PduHeard | BurstOver
+
+
+def snr_of_llrs(snr_db: float, hidden: float) -> float:
+    """The SNR in dB at which `hidden` bits fewer could be sent on a subcarrier than at `snr_db`.
+
+    Interference hid them: its power on all subcarriers, samples and subcarriers that were cut. This
+    does not depend on the MCS, so that rate control finds the one that the interference leaves, and
+    then stays there. Clipped peaks hide bits, too: far above what an MCS needs, up to one.
+    """
+    if hidden < _BY_CHANCE:
+        return snr_db
+    left = (1 + 10 ** (snr_db / 10)) / 2**hidden - 1
+    return round(10 * math.log10(max(left, _LEAST_SNR)), 3)
+
 
 COUNTERS = (
     "samples",

@@ -107,7 +107,7 @@ class Receiver:
         """Those that no burst has; the last one is for the next burst."""
         self._demodulator = Demodulator(grid)
         self.cuts: Cuts | None = None
-        self._powers = np.empty(SLIP_EVERY, np.float32)
+        self._powers, self._hidden = np.empty(SLIP_EVERY, np.float32), np.empty(SLIP_EVERY)
         self._memory = new_search_memory(HOP)
         # The samples that acquisition needs: how many before the peak, and how many in total.
         self._before = before(grid) - 1 - preamble.guard(grid)
@@ -284,10 +284,7 @@ class Receiver:
         if not self._places:
             self._places.append(self._new_place())
         acquisition = self._places[-1].acquisition
-        if self.cuts is not None:
-            known = np.arange(base + before(self._grid), base + self._span, self._grid.n_fft)
-            acquisition.leave_out_always(self.cuts.kept(known, self._coarse, self._grid))
-        found = acquisition.acquire(x, base, self._coarse, self._dc_value)
+        found = acquisition.acquire(x, base, self._coarse, self._dc_value, self.cuts)
         self.counters["preambles"] += not isinstance(found, Missed) or found.stage != "preamble"
         if isinstance(found, Missed):
             self._screening.missed()
@@ -334,7 +331,10 @@ class Receiver:
         if not burst.decoded:
             if self._stream.end < burst.need:
                 return False
-            burst.take(self._stream, self._demodulator, self._powers, self.cuts, self.on_points)
+            burst.take(
+                self._stream, self._demodulator, self._powers, self._hidden, self.cuts,
+                self.on_points,
+            )  # fmt: skip
         if not burst.decoded:
             return True
         is_alone = len(self._bursts) == 1 and self._state is State.SEARCH
@@ -343,13 +343,14 @@ class Receiver:
         n_good, until = burst.n_good, begin - 1
         number = n_good + burst.n_bad
         while burst.decoded:
-            data, end, plain_until, is_gone = burst.decoded.popleft()
+            data, end, plain_until, is_gone, snr_db = burst.decoded.popleft()
             number += 1
             is_last = number == n_pdus
             if data is not None:
                 n_good += 1
                 doppler = burst.doppler if is_last else None
-                events.append(PduHeard(data, number - 1, end + BACKOFF, quality, doppler))
+                at = end + BACKOFF
+                events.append(PduHeard(data, number - 1, at, quality, snr_db, doppler))
                 # It may have outlived the begin of another burst; if so, the next one will not.
                 known = plain_until if is_last else min(plain_until, max(burst.judged, end - BACK))
                 until = known if known >= burst.judged else until

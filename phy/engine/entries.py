@@ -29,7 +29,9 @@ def _entry(arguments: str, results: str = "") -> Entry:
 ENTRIES = {
     "acquire": _entry("c8[1] i8 f8 c16 f8 block block block block block block", "i8 f8"),
     "settle": _entry("f4[3] block block block block block", "f8 f8 f8"),
-    "demodulate": _entry("c8[1] i8 f8 c16 i8 i8 block block block block c8[2] i2[1] f4[1]", "f8"),
+    "demodulate": _entry(
+        "c8[1] i8 f8 c16 i8 i8 block block block block c8[2] i2[1] f4[1] f8[1]", "f8"
+    ),
     "to_tones": _entry("c8[1] i8[1] f8 c16 i8 block block f4[3]"),
     "slip": _entry("i8 block block"),
     "learn_channel": _entry("f4[3] f4[3] block block block"),

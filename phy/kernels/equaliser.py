@@ -107,10 +107,27 @@ def renew(channel: Channel) -> None:
 
 
 @step
+def _make_whole(re: Row, im: Row, whole: float, channel: Channel) -> float:
+    """Scale up a symbol of which only a share is `whole`; returns its noise on a subcarrier.
+
+    The rest was blanked: that lets power of all subcarriers leak into each.
+    """
+    by = splat(1 / whole)
+    for k in range(0, re.size, N_LANES):
+        store(re, k, load(re, k) * by)
+        store(im, k, load(im, k) * by)
+    return float((_noise(channel) + channel.figures[GAIN] * (1 - whole)) / whole)
+
+
+@step
 def _pilots(
-    re: Row, im: Row, kept: Row, polarity: float, tones: Tones, channel: Channel, scratch: Scratch
-) -> tuple[float, float]:
-    """Track a symbol's phase, slope and amplitude by its pilots; returns (noise, amplitude)."""
+    re: Row, im: Row, kept: Row, no: float, polarity: float, tones: Tones, channel: Channel,
+    scratch: Scratch,
+) -> tuple[float, float]:  # fmt: skip
+    """Track a symbol's phase, slope and amplitude by its pilots; returns (noise, amplitude).
+
+    `no` is the noise on a subcarrier, as far as it is known before.
+    """
     tracking, turned, power = channel.tracking, scratch.turned, scratch.pilot_power
     predict(tracking)
     back = complex(math.cos(tracking[PHASE, 0]), -math.sin(tracking[PHASE, 0])) * polarity
@@ -126,7 +143,7 @@ def _pilots(
             turned[p], power[p] = 0j, 0.0
     subcarriers = tones.subcarriers[tones.n_data :]
     no, movement, amplitude, differ = correct(
-        turned, power, subcarriers, _noise(channel), channel.figures, channel.missed, tracking
+        turned, power, subcarriers, no, channel.figures, channel.missed, tracking
     )
     if amplitude != 1.0:
         scale(amplitude, channel)
@@ -266,7 +283,7 @@ def equalise(
     `y` `[≥ n, 2, width]` has real and imaginary parts, in the order of tones. Its first symbol is
     number `number`; the header's first symbol is 0. `channel` carries over from call to call.
     `points` `[…, n_data]` gets the equalised points if it has any rows. The rows of
-    `channel.kept` are those of `llr`, and repeat.
+    `channel.kept`, `whole` and `trust` are those of `llr`, and repeat.
     """
     n_data, n_bits, unit = tones.n_data, axes.gather.size, axes.unit
     gather, planes, figures = axes.gather, scratch.planes, channel.figures
@@ -278,8 +295,11 @@ def equalise(
         if figures[MOVES] > 0:
             move_on(tones, channel)
             renew(channel)
-        kept = channel.kept[(first + row) % channel.kept.shape[0]]
-        no, amplitude = _pilots(re, im, kept, polarity, tones, channel, scratch)
+        place = (first + row) % channel.whole.size
+        kept, known = channel.kept[place], _noise(channel)
+        if channel.whole[place] < 1:
+            known = _make_whole(re, im, channel.whole[place], channel)
+        no, amplitude = _pilots(re, im, kept, known, polarity, tones, channel, scratch)
         if abs(channel.tracking[SLOPE, 0] - figures[SLOPE_USED]) > most_lag:
             use_slope(channel.tracking[SLOPE, 0], tones, channel)
         # A symbol with more noise than the preamble, as under interference, counts less.
@@ -292,7 +312,8 @@ def equalise(
             if off > NO_STEP:
                 no = off * _noise(channel)
                 trust, belief = 1 / off, _noise(channel) / (no + figures[DOUBT])
-        figures[N_ODD] = figures[N_ODD] + 1 if trust < _ODD else 0
+        channel.trust[place] = trust
+        figures[N_ODD] = figures[N_ODD] + 1 if known < _ODD * no else 0
         certain, wrong = _data(re, im, kept, c, s, trust, belief, axes, channel, scratch, n_data)
         if points.shape[0]:
             for d in range(n_data):

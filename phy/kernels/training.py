@@ -48,12 +48,14 @@ def least_squares(
     """Write each tone's gain over `n` ≥ 2 symbols to `h` `[2, width]`; returns (Σ noise, Σ |h|²).
 
     `sent` `[n, 2, width]` holds 1 / x* of tones x, which were sent times `amplitude` `[n]` and
-    received as `y`. Both sums are over the tones.
+    received as `y`. Both sums are over the tones. A symbol with the amplitude 0, and 0 as `y`, does
+    not count.
     """
-    n, width = sent.shape[0], sent.shape[2]
+    n, width, n_heard = sent.shape[0], sent.shape[2], 0
     mass = np.float32(0)
     for s in range(n):
         mass += amplitude[s] * amplitude[s]
+        n_heard += amplitude[s] > 0
     share = splat(1 / mass)
     noise: Lanes = splat(0)
     power: Lanes = splat(0)
@@ -75,7 +77,7 @@ def least_squares(
             re_off = a * c + b * d - re * strength
             im_off = b * c - a * d - im * strength
             noise = noise + (re_off * re_off + im_off * im_off)
-    return float(total(noise)) / (n - 1), float(total(power))
+    return float(total(noise)) / (n_heard - 1), float(total(power))
 
 
 @step
@@ -173,9 +175,13 @@ def learn(
     """Estimate the channel again, with the decoded header as further training; overwrites `y`.
 
     `phase` is the last symbol's, `rate` its growth per symbol. The preamble may have been sent
-    stronger than the rest: the header shows whether, and by how much.
+    stronger than the rest: the header shows whether, and by how much. Symbols of which samples
+    were blanked are left out, unless fewer than two others are left.
     """
-    n, width = sent.shape[0], sent.shape[2]
+    n, width, n_whole, n_lost = sent.shape[0], sent.shape[2], 0, 0
+    for s in range(n):
+        n_whole += channel.whole[s] == 1
+        n_lost += s < n_training and channel.whole[s] < 1
     seen: Lanes = splat(0)
     expected: Lanes = splat(0)
     for s in range(n_training, n):
@@ -187,6 +193,8 @@ def learn(
             at = 2 * width * s + k
             store(y, at, a)
             store(y, at + width, b)
+            if channel.whole[s] < 1:
+                continue
             keep = load(channel.kept[0], k)
             h_re, h_im = load(channel.h, k) * keep, load(channel.h, width + k) * keep
             seen = seen + (a * (h_re * c - h_im * d) + b * (h_re * d + h_im * c))
@@ -194,10 +202,17 @@ def learn(
     amplitude = local(np.float32, n)
     amplitude[:] = 1
     match, power = float(total(seen)), float(total(expected))
-    if match > 0.0:
+    # What is missing in the training would look like a weaker one.
+    if match > 0.0 and not n_lost:
         # The gains may have been scaled to the header.
         ratio = power / match / channel.figures[SCALED]
         if abs(1 / ratio - 1) > _SURELY * math.sqrt(0.5 * channel.figures[NO] / power):
             for s in range(n_training):
                 amplitude[s] = min(max(ratio, 1 / _LARGEST_BOOST), _LARGEST_BOOST)
+    if n_whole >= 2:
+        for s in range(n):
+            if channel.whole[s] < 1:
+                amplitude[s] = 0
+                for k in range(width):
+                    y[s, 0, k] = y[s, 1, k] = 0
     estimate(y, amplitude, sent, tones, channel, scratch)

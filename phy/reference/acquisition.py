@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from phy import preamble
 from phy.constellation import Modulation
+from phy.cuts import Cuts
 from phy.header import BurstHeader, n_symbols
 from phy.numerology import Numerology
 from phy.quality import BurstQuality
@@ -75,15 +76,24 @@ class Acquisition:
         base: int,
         coarse: float,
         dc: complex,
-        kept: NDArray[np.float32] | None = None,
+        cuts: Cuts | None = None,
     ) -> Acquired | Missed:
         """Decode the header of the burst whose first long symbol is nominally at `x[before(grid)]`.
 
         `base` is the absolute index of `x[0]`, `coarse` the frequency of the peak, modulo 1/16
-        cycles per sample. Subcarriers with 0 in `kept` `[n_used]` were cut.
+        cycles per sample. `cuts` is what an excisor took out. A subcarrier that it cut anywhere is
+        left out of training and header.
         """
         grid = self._grid
-        whole = np.ones(grid.n_used, np.float32) if kept is None else kept
+        kept = whole = None
+        if cuts is not None:
+            kept = cuts.kept(
+                np.arange(base + before(grid), base + len(x), grid.n_fft), coarse, grid
+            )
+            # About where the header is: it need not be known better.
+            about = base + before(grid) - self._windows[0] + self._windows[preamble.N_LONG :]
+            whole = cuts.whole(about, grid)
+        always = np.ones(grid.n_used, np.float32) if kept is None else kept.min(0)
         # 2. Timing and offset.
         first = before(grid) - SEARCH
         found = locate(turned_back(x[first:], dc, coarse), self._templates)
@@ -95,26 +105,27 @@ class Acquisition:
         burst = x[begin:]
         # 3. Channel, 4. offset again, and with it the channel.
         y = to_subcarriers(burst, self._windows, frequency, dc, grid)
-        channel = self._of_training(y, whole)
+        channel = self._of_training(y, always)
         frequency += refine(turned_back(burst, dc, frequency), channel.h, grid)
         y = to_subcarriers(burst, self._windows, frequency, dc, grid)
-        channel = self._of_training(y, whole)
+        channel = self._of_training(y, always)
         # 5. Header.
         clock_error = frequency / self._centre_cycles if self._centre_cycles else None
         equaliser = Equaliser(grid, channel, Tracking(grid, channel, clock_error))
-        llr, points = self._read(y[preamble.N_LONG :], equaliser, whole)
+        llr, points = self._read(y[preamble.N_LONG :], equaliser, always, whole)
         header = parse_header(folded(llr))
         if header is None:
             return Missed("header")
         sent = header_subcarriers(header, grid)
-        self._learn(y, sent, equaliser, whole)
+        whole = None if cuts is None else cuts.whole(base + begin + self._windows, grid)
+        self._learn(y, sent, equaliser, always, whole)
         training = burst[self._windows[0] :][: preamble.N_LONG * grid.n_fft]
         quality = BurstQuality(
             base + begin + BACKOFF,
             *header,
             snr_db=_snr_db(equaliser.channel, grid),
             rssi_dbfs=decibel(float(np.mean(np.abs(training - dc) ** 2))),
-            evm_db=_evm_db(points, sent[:, grid.data_at], whole[grid.data_at]),
+            evm_db=_evm_db(points, sent[:, grid.data_at], always[grid.data_at]),
             cfo=frequency,
         )
         origin = base + begin
@@ -127,13 +138,22 @@ class Acquisition:
         return estimate(y[:n], self._long, np.ones(n), self._grid, kept)
 
     def _read(
-        self, y: Subcarriers, equaliser: Equaliser, kept: NDArray[np.float32]
+        self,
+        y: Subcarriers,
+        equaliser: Equaliser,
+        kept: NDArray[np.float32],
+        whole: NDArray[np.float32] | None,
     ) -> tuple[NDArray[np.int16], NDArray[np.complex128]]:
         """Convert header symbols `[n, n_used]` to (LLRs `[n · n_data]`, points `[n, n_data]`)."""
-        return equaliser.equalise(y, 0, Modulation.BPSK, np.tile(kept, (len(y), 1)))
+        return equaliser.equalise(y, 0, Modulation.BPSK, np.tile(kept, (len(y), 1)), whole)
 
     def _learn(
-        self, y: Subcarriers, sent: Subcarriers, equaliser: Equaliser, kept: NDArray[np.float32]
+        self,
+        y: Subcarriers,
+        sent: Subcarriers,
+        equaliser: Equaliser,
+        kept: NDArray[np.float32],
+        whole: NDArray[np.float32] | None,
     ) -> None:
         """Refine the channel with the decoded header: four symbols instead of two.
 
@@ -144,7 +164,7 @@ class Acquisition:
         rotation = np.asarray(tracked.value - tracked.rate * later, np.float64)
         known = np.concatenate((self._long, sent))
         equaliser.channel = learn(
-            y, known, preamble.N_LONG, rotation, equaliser.channel, self._grid, kept
+            y, known, preamble.N_LONG, rotation, equaliser.channel, self._grid, kept, whole
         )
 
 

@@ -49,6 +49,8 @@ class Equaliser:
         self._grid = grid
         self.channel = channel
         self.tracking = tracking
+        self.trust: list[float] = []
+        """Noise of the preamble over that of each symbol of the last call."""
         self._forget_block()
 
     def equalise(
@@ -57,6 +59,7 @@ class Equaliser:
         number: int,
         modulation: Modulation,
         kept: NDArray[np.float32] | None = None,
+        whole: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.int16], Subcarriers]:
         """Convert symbols `[n, n_used]` to LLRs in the order of the code, and points.
 
@@ -65,20 +68,25 @@ class Equaliser:
         N' is the noise and the mean variance of Ĥ. LLRs `[n · n_data · bits]` are in eighths,
         positive for 0; the equalised points are `[n, n_data]`. The header's first symbol has number
         0; the first one here has `number`, and symbols are consecutive. Subcarriers with 0 in
-        `kept` `[n, n_used]` tell nothing.
+        `kept` `[n, n_used]` tell nothing. `whole` `[n]` is the share w of each symbol's samples
+        that were not blanked. Such a symbol is scaled up, and has the noise
+        (N + (1 − w) mean |H|²) / w.
         """
-        whole = np.ones(y.shape, np.float32) if kept is None else kept
+        rows = np.ones(y.shape, np.float32) if kept is None else kept
+        shares = [1.0] * len(y) if whole is None else whole.tolist()
+        self.trust = []
         waiting: list[Tracked] = []
         parts = []
         signs = polarity(len(y), number).tolist()
-        for each, row, sign in zip(y, whole, signs, strict=True):
+        for part, row, share, sign in zip(y, rows, shares, signs, strict=True):
             if self.channel.moves:
                 # The channel moves, so each symbol has its own.
                 parts += self._equalise(waiting, modulation)
                 self._move_on()
             self.tracking.predict()
-            at = self._grid.pilots_at
-            shown = self.tracking.correct(each[at], sign, self.channel, row[at])
+            at, each = self._grid.pilots_at, part / share
+            known = (self.channel.noise + (1 - share) * self.channel.gain) / share
+            shown = self.tracking.correct(each[at], sign, self.channel, row[at], known)
             if shown.movement > 0 or shown.amplitude != 1:
                 parts += self._equalise(waiting, modulation)
                 self._believe(shown)
@@ -87,7 +95,8 @@ class Equaliser:
             tracked = Tracked(each, row, shown.no, self.tracking.angle, sign)
             if shown.amplitude != 1:
                 tracked = self._examined(tracked, modulation)
-            is_odd = self.channel.noise < ODD * tracked.no
+            self.trust.append(self.channel.noise / tracked.no)
+            is_odd = known < ODD * tracked.no
             self.channel.n_odd = self.channel.n_odd + 1 if is_odd else 0
             waiting.append(tracked)
             if self._n_heard + len(waiting) >= self.channel.due:

@@ -9,6 +9,7 @@ from phy.crc import checked
 from phy.cuts import Cuts
 from phy.layout import BurstLayout
 from phy.numerology import Numerology
+from phy.quality import snr_of_llrs
 from phy.reference.acquisition import Acquired
 from phy.reference.ldpc import decode_blocks
 from phy.reference.ofdm import Subcarriers, to_subcarriers
@@ -44,6 +45,9 @@ class Payload:
         self._window = acquired.window
         self._llr = np.zeros(0, np.int16)
         self._powers: list[float] = []
+        self._hidden = np.zeros(0)
+        self.snr_db = acquired.quality.snr_db
+        """SNR of the LLRs of the last PDU."""
         self.judged = acquired.window
         channel = acquired.equaliser.channel
         self._level = channel.gain + channel.no
@@ -82,10 +86,18 @@ class Payload:
         x = stream[self.window(first) - start : self.need - start]
         y = to_subcarriers(x, windows - windows[0], found.frequency, self._dc, grid, origin)
         self._powers += np.mean(np.abs(y) ** 2, axis=1).tolist()
-        kept = None if cuts is None else cuts.kept(windows, found.frequency, grid)
+        kept = whole = None
+        if cuts is not None:
+            kept = cuts.kept(windows, found.frequency, grid)
+            whole = cuts.whole(windows, grid)
         llr, points = found.equaliser.equalise(
-            y, self._n_header + first, self.plan.mcs.modulation, kept
+            y, self._n_header + first, self.plan.mcs.modulation, kept, whole
         )
+        # Bits on a subcarrier, without interference and with it.
+        snr = found.equaliser.channel.gain / found.equaliser.channel.no * grid.n_used / grid.n_fft
+        share = 1.0 if kept is None else kept.mean(axis=1)
+        left = share * np.log2(1 + snr * np.array(found.equaliser.trust))
+        self._hidden = np.log2(1 + snr) - left
         self._llr = np.concatenate((self._llr, llr))
         self.n_symbols_in += len(windows)
         return points
@@ -129,7 +141,10 @@ class Payload:
         if is_last and channel.n_odd > MOST_ODD:
             plain_until = min(plain_until, end - BACK)
         lacks_power = len(powers) > 0 and bool(powers.mean() < channel.no + FADED * channel.gain)
-        self._powers = []
+        if len(self._hidden):
+            told = self.acquired.quality.snr_db
+            self.snr_db = snr_of_llrs(told, float(self._hidden.mean()))
+        self._powers, self._hidden = [], np.zeros(0)
         self.judged = end
         return data, lacks_power and not is_last, plain_until
 

@@ -222,12 +222,7 @@ class Receiver:
         x = self._view(base, base + self._span)
         if x is None:
             return False
-        kept = None
-        if self.cuts is not None:
-            starts = np.arange(base + before(self._grid), base + self._span, self._grid.n_fft)
-            of_each = self.cuts.kept(starts, coarse, self._grid)
-            kept = None if of_each is None else of_each.min(0)
-        found = self._acquisition.acquire(x, base, coarse, self._detector.dc, kept)
+        found = self._acquisition.acquire(x, base, coarse, self._detector.dc, self.cuts)
         self._peak = None
         self.counters["preambles"] += not isinstance(found, Missed) or found.stage != "preamble"
         if isinstance(found, Missed):
@@ -282,8 +277,9 @@ class Receiver:
             is_last = burst.n_done == burst.plan.n_pdus
             if data is not None:
                 self.counters["pdus_good"] += 1
+                quality = burst.acquired.quality
                 at, doppler = burst.judged + BACKOFF, burst.doppler if is_last else None
-                events.append(PduHeard(data, burst.n_done - 1, at, burst.acquired.quality, doppler))
+                events.append(PduHeard(data, burst.n_done - 1, at, quality, burst.snr_db, doppler))
                 lacks_power = False
                 # It may have outlived the begin of another burst; if so, the next one will not.
                 until = burst.judged if is_last else max(begin, burst.judged - BACK)

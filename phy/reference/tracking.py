@@ -122,11 +122,12 @@ class Tracking:
         return np.asarray(self.phase.value + self.slope.value * self._grid.used, np.float64)
 
     def correct(
-        self, pilots: Subcarriers, polarity: float, channel: Channel, kept: NDArray[np.float32]
-    ) -> Shown:
+        self, pilots: Subcarriers, polarity: float, channel: Channel, kept: NDArray[np.float32],
+        no: float,
+    ) -> Shown:  # fmt: skip
         """Correct φ and s by a symbol's pilots `[n_pilots]`; returns what else they show.
 
-        A pilot with 0 in `kept` has no weight.
+        A pilot with 0 in `kept` has no weight. `no` is N, as far as it is known before.
 
         θ_p = arg(Y_p Ĥ*_p P_p) − φ − s k_p;  S_i = Σ|Ĥ_p|² k_p^i
         Var(φ) = N/2 · S₂ / (S₀S₂ − S₁²),  Var(s) = N/2 · S₀ / (S₀S₂ − S₁²)
@@ -134,7 +135,7 @@ class Tracking:
         k, h = self._k, channel.h[self._grid.pilots_at] * kept
         back = np.exp(-1j * (self.phase.value + self.slope.value * k))
         turned = pilots * h.conj() * (polarity * self._pilots) * back
-        return self.correct_by(turned, np.abs(h) ** 2, k, channel)
+        return self.correct_by(turned, np.abs(h) ** 2, k, channel, no)
 
     def correct_by(
         self,
@@ -142,6 +143,7 @@ class Tracking:
         weight: NDArray[np.float64],
         k: NDArray[np.int64],
         channel: Channel,
+        no: float,
     ) -> Shown:
         """Correct φ and s by weighted least squares over the angles of the pilots.
 
@@ -150,7 +152,7 @@ class Tracking:
         by more than the noise and the gains' doubt are evidence: of interference if they differed
         otherwise a symbol before, else of movement.
         """
-        no, doubt, spread = channel.noise, channel.doubt, channel.spread
+        doubt, spread = channel.doubt, channel.spread
         total, expected = complex(turned.sum()), float(weight.sum())
         if total == 0 or expected <= 0:
             return Shown(no, 0.0, 1.0, False)

@@ -26,11 +26,12 @@ def least_squares(
 
         Ĥ_k = Σ_s a_s Y_sk/X_sk / Σ_s a_s²;  N = mean_k Σ_s |Y_sk/X_sk − a_s Ĥ_k|² / (n − 1)
 
-    Symbol s was `sent` a_s times as strong. |X| is 1 or close to it: Y/X is Y X*.
+    Symbol s was `sent` a_s times as strong. |X| is 1 or close to it: Y/X is Y X*. Symbols with
+    a_s = 0 and Y_s = 0 do not count.
     """
     ratio, a = y / sent, amplitude[:, None]
     h = np.sum(a * ratio, axis=0) / np.sum(amplitude**2)
-    noise = np.sum(np.abs(ratio - a * h) ** 2) / (len(y) - 1)
+    noise = np.sum(np.abs(ratio - a * h) ** 2) / (np.sum(amplitude > 0) - 1)
     return h, float(noise / y.shape[1])
 
 
@@ -66,6 +67,7 @@ def estimate(
 def learn(
     y: Subcarriers, sent: Subcarriers, n_training: int, rotation: NDArray[np.float64],
     before: Channel, grid: Numerology, kept: NDArray[np.float32] | None = None,
+    whole: NDArray[np.float32] | None = None,
 ) -> Channel:  # fmt: skip
     """Estimate the channel again, with the decoded header as further training.
 
@@ -73,18 +75,23 @@ def learn(
 
     The first `n_training` symbols of `y` and `sent` `[n, n_used]` are the preamble's; the others
     have turned by `rotation` radians `[n − n_training]`. The preamble may have been sent stronger
-    than the rest by `strength`, which counts as 1 if it differs from 1 only by chance.
+    than the rest by `strength`, which counts as 1 if it differs from 1 only by chance, or if
+    samples of the training were blanked. Symbols are left out of which only a share is `whole`
+    `[n]`, unless fewer than two others are left.
     """
-    whole = np.ones(grid.n_used, np.float32) if kept is None else kept
+    weights = np.ones(grid.n_used, np.float32) if kept is None else kept
+    is_whole = np.ones(len(y), bool) if whole is None else whole == 1
     y = y.copy()
     y[n_training:] *= np.exp(-1j * rotation)[:, None]
-    ratio = (whole * y / sent)[n_training:]
+    ratio = (weights * y / sent)[n_training:][is_whole[n_training:]]
     seen = float(np.sum((ratio * before.h.conj()).real))
-    expected = float(np.sum(whole * np.abs(before.h) ** 2)) * len(ratio)
+    expected = float(np.sum(weights * np.abs(before.h) ** 2)) * len(ratio)
     amplitude = np.ones(len(y))
-    if seen > 0:
+    if seen > 0 and is_whole[:n_training].all():
         # The gains may have been scaled to the header.
         strength = expected / seen / before.scaled
         if abs(1 / strength - 1) > SURELY * np.sqrt(0.5 * before.no / expected):
             amplitude[:n_training] = np.clip(strength, 1 / LARGEST_BOOST, LARGEST_BOOST)
+    if is_whole.sum() >= 2:
+        y[~is_whole] = amplitude[~is_whole] = 0
     return estimate(y, sent, amplitude, grid, kept)

@@ -51,7 +51,10 @@ class Axes(NamedTuple):
     """Position of each bit of the code's order in a symbol whose bits lie plane by plane."""
 
 
-@block_of("f4[2] f4[2] f4[2] f4[2] f4[2] f4[1] f4[2] f4[1] f8[2] f8[1] f8[1] f8[2] f8[2] f4[2]")
+@block_of(
+    "f4[2] f4[2] f4[2] f4[2] f4[2] f4[1] f4[2] f4[1] "
+    "f8[2] f8[1] f8[1] f8[2] f8[2] f4[2] f4[1] f4[1]"
+)
 class Channel(NamedTuple):
     """What is known of a burst's channel; it is updated during the burst."""
 
@@ -88,6 +91,10 @@ class Channel(NamedTuple):
 
     Row 0 also stands for the known symbols, as long as the channel is estimated.
     """
+    whole: Row
+    """Share of the samples of each symbol's FFT window that were not blanked `[n]`."""
+    trust: Row
+    """Noise of the preamble over that of each symbol `[n]`: 1, less under interference."""
 
     @property
     def no(self) -> float:

@@ -203,10 +203,10 @@ def _llrs(
     if last > len(samples):
         return None
     llr = np.empty(n_symbols * _GRID.n_data * modulation.bits, np.int16)
-    powers = np.empty(n_symbols, np.float32)
+    powers, hidden = np.empty(n_symbols, np.float32), np.empty(n_symbols)
     Demodulator(_GRID).demodulate(
         samples[window:last], frequency, 0j, window - origin, modulation, channel, first_symbol,
-        llr, powers, points,
+        llr, powers, hidden, points,
     )  # fmt: skip
     return llr
 

@@ -15,12 +15,14 @@ from phy import (
     Jammer,
     Path,
     PathParams,
+    PduHeard,
     Transmitter,
     pulse,
     reference,
 )
 from phy.engine import in_use
 from phy.testing import compute, new_notch_memory, notch_tables
+from tests.laws import law
 from tests.phy.signals import heard, noise, noisy, payloads, silence
 
 SIZE, STRIDE = notch_tables.SIZE, notch_tables.STRIDE
@@ -357,6 +359,55 @@ def test_64qam_is_read_around_lines(rng, engine):
         n_heard.append(len(heard(receiver.push(excisor.push(x)) + receiver.flush())))
     assert n_heard[0] >= 10
     assert n_heard[1] <= 5
+
+
+@pytest.mark.parametrize("engine", ["in use", "reference"])
+def test_64qam_is_read_around_pulses(rng, engine):
+    """Without the knowledge of what was blanked, most of these are lost."""
+    _, x = a_stream(rng, 20, 220, 5, 28)
+    x = jammed(rng, x, "pulses", 17, period_s=3e-4, duty=0.05)
+    kind, n_heard = reference.Receiver if engine == "reference" else in_use().receiver, []
+    for knows in (True, False):
+        receiver, excisor = kind(), Excisor()
+        receiver.cuts = excisor.cuts if knows else None
+        n_heard.append(len(heard(receiver.push(excisor.push(x)) + receiver.flush())))
+    assert n_heard[0] >= 13
+    assert n_heard[1] <= 7
+
+
+def test_the_snr_that_is_told_of_pdus_beside_pulses_does_not_depend_on_their_mcs(rng):
+    """So that rate control does not go down and down. Without them, it is that of the burst."""
+    told = []
+    for mcs in (1, 3, 5):
+        _, x = a_stream(rng, 30, 220, mcs, 28)
+        clear = [event for event in in_use().receiver().push(x) if isinstance(event, PduHeard)]
+        # Pilots differ by chance, and where peaks were clipped.
+        assert np.mean([each.burst.snr_db - each.snr_db for each in clear]) < 0.5
+        x = jammed(rng, x, "pulses", 17, period_s=3e-4, duty=0.05)
+        receiver, excisor = in_use().receiver(), Excisor()
+        receiver.cuts = excisor.cuts
+        events = receiver.push(excisor.push(x))
+        told.append(np.mean([each.snr_db for each in events if isinstance(each, PduHeard)]))
+        bursts = [each.burst.snr_db for each in events if isinstance(each, PduHeard)]
+        assert np.mean(bursts) == pytest.approx(28, abs=0.5)
+    assert max(told) < 24
+    assert max(told) - min(told) < 1
+
+
+@law(100)
+@given(st.lists(st.integers(0, 9 * BLOCK - 1)), st.lists(st.integers(0, 8 * BLOCK), min_size=1))
+def test_what_was_blanked_is_known_by_symbol(samples, starts):
+    blank, cuts = np.zeros(9 * BLOCK, bool), Excisor().cuts
+    blank[samples] = True
+    for block in range(9):
+        if blank[block * BLOCK : (block + 1) * BLOCK].any():
+            cuts.blank(block, blank[block * BLOCK : (block + 1) * BLOCK])
+    starts.sort()
+    for grid in GRIDS.values():
+        lost = [blank[each : each + grid.n_fft].sum() for each in starts]
+        whole = cuts.whole(np.array(starts), grid)
+        due = np.maximum(grid.n_fft - np.array(lost), 1) / grid.n_fft
+        assert np.allclose(1 if whole is None else whole, due)
 
 
 def test_impossible_gaps_are_refused():

@@ -59,17 +59,26 @@ def test_the_channel_that_training_tells_is_the_same(grid):
 
 @every_grid
 def test_what_a_header_tells_besides_is_the_same(grid):
-    for seed, boost in enumerate((0.8, 1.0, 1.41, 5.0)):
+    blanked = (None, None, None, None, 1, 3)
+    for seed, (boost, lost) in enumerate(
+        zip((0.8, 1.0, 1.41, 5.0, 1.0, 1.0), blanked, strict=True)
+    ):
         amplitude = np.array([boost, boost, 1, 1])
         y, sent, _ = trained(rng(seed), grid, 0.02, 4, amplitude)
         block, before = both_estimates(grid, y[:2], sent[:2])
-        rotation = 0.3 + 0.1 * np.arange(2)
+        rotation, whole = 0.3 + 0.1 * np.arange(2), np.ones(4, np.float32)
+        if lost is not None:
+            # Some samples of the training, or of the header, were blanked.
+            whole[lost] = 0.5
+            y[lost] *= 0.5
+        block.content.whole[:4] = whole
         y[2:] *= np.exp(1j * rotation)[:, None]
         kernels.learn(
             in_tones(y, grid), in_tones(sent, grid), 2, rotation[-1], 0.1,
             tones(grid).content, block.content, new_scratch(grid).content,
         )  # fmt: skip
-        assert_same(block.content, training.learn(y, sent, 2, rotation, before, grid), grid)
+        learned = training.learn(y, sent, 2, rotation, before, grid, None, whole)
+        assert_same(block.content, learned, grid)
 
 
 @every_grid
@@ -159,7 +168,9 @@ def test_pilots_are_tracked_alike(grid, clock_error):
             came[0], weight[0] = -came[0], 1.0
         came = came.astype(np.complex128)
         shown = _correct(came, weight, subcarriers, channel.noise, block.content)
-        assert other.correct_by(came, weight, subcarriers, channel) == pytest.approx(shown)
+        assert other.correct_by(came, weight, subcarriers, channel, channel.noise) == pytest.approx(
+            shown
+        )
         no, movement, amplitude, _ = shown
         drowned += [number] * (no > 6 * channel.no)
         moved += [number] * (movement > 0.1)
@@ -175,10 +186,11 @@ def test_pilots_are_tracked_alike(grid, clock_error):
     assert other.slope.value == pytest.approx(ours[SLOPE, 0])
 
 
-def equalised(grid, modulation, n, lean, no):
+def equalised(grid, modulation, n, lean, no, whole=1):
     """(the kernel's LLRs, points, channel; the reference's LLRs, points, equaliser).
 
-    The `n` symbols rotate, with a growing slope, which reaches `lean` radians per subcarrier.
+    The `n` symbols rotate, with a growing slope, which reaches `lean` radians per subcarrier. Only
+    a share of each is `whole`.
     """
     draws, n_bits = rng(modulation.bits), grid.n_data * modulation.bits
     block, channel = both_estimates(grid, *trained(draws, grid, no)[:2])
@@ -194,7 +206,9 @@ def equalised(grid, modulation, n, lean, no):
     angle = 0.01 * np.arange(n)[:, None] + lean / n * np.arange(n)[:, None] * grid.used
     y = y * np.exp(1j * angle)
     y[:, grid.data_at] += noise(draws, n * grid.n_data, no).reshape(n, -1)
-    y = y.astype(np.complex64)
+    whole = np.ones(n, np.float32) * np.float32(whole)
+    y = (y * whole[:, None]).astype(np.complex64)
+    block.content.whole[:n] = whole
     kernels.start_tracking(tones(grid).content, block.content, 0.0, False)
     follows = tracking.Tracking(grid, channel, None)
     if not lean:
@@ -207,7 +221,11 @@ def equalised(grid, modulation, n, lean, no):
         block.content, new_scratch(grid).content, points, llr, 0,
     )  # fmt: skip
     equaliser = reference.equaliser.Equaliser(grid, channel, follows)
-    made = [equaliser.equalise(each[None], 2 + i, modulation) for i, each in enumerate(y)]
+    made, trust = [], []
+    for i, each in enumerate(y):
+        made.append(equaliser.equalise(each[None], 2 + i, modulation, None, whole[i : i + 1]))
+        trust += equaliser.trust
+    assert trust == pytest.approx(block.content.trust[:n].tolist(), rel=1e-3)
     other = np.concatenate([each for each, _ in made]), np.concatenate([each for _, each in made])
     return (llr, points, block.content), (*other, equaliser)
 
@@ -227,6 +245,18 @@ def test_symbols_are_equalised_alike(grid, modulation, noise_share):
     assert ours[1] == pytest.approx(other[1], abs=1e-3 * np.abs(other[1]).max())
     assert_same(ours[2], other[2].channel, grid)
     assert ours[2].tracking[PHASE, 0] == pytest.approx(other[2].tracking.phase.value, abs=1e-4)
+
+
+@every_grid
+def test_symbols_of_which_samples_were_blanked_are_equalised_alike(grid):
+    whole = np.ones(BLOCK)
+    whole[[1, 4]] = 0.7, 0.2
+    ours, other = equalised(grid, Modulation.QPSK, BLOCK, 0.0, 0.01, whole)
+    assert np.abs(ours[0].astype(int) - other[0]).max() <= 1
+    assert ours[1] == pytest.approx(other[1], abs=1e-3 * np.abs(other[1]).max())
+    assert_same(ours[2], other[2].channel, grid)
+    trust = ours[2].trust[:BLOCK]
+    assert np.all((trust < 0.1) == (whole < 1))
 
 
 @every_grid

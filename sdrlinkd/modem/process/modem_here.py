@@ -259,7 +259,7 @@ class ModemHere:
         rate = self._params.rate_hz
         heard = [
             Heard(
-                pdu.data, pdu.burst.start / rate, pdu.burst.snr_db, pdu.at / rate,
+                pdu.data, pdu.burst.start / rate, pdu.snr_db, pdu.at / rate,
                 None if pdu.doppler is None else pdu.doppler * rate,
             )
             for pdu in pdus
