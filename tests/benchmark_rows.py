@@ -211,6 +211,19 @@ ROWS = {
         *(f"doppler_{hz}hz_1x220B_1msps_lost" for hz in (40, 100)),
         *(f"doppler_40hz_{burst}_1msps_lost" for burst in ("5x64B", "4x220B")),
         *(f"gain_step_64qam_{db}db_lost" for db in (-3, -6)),
+        *(f"cw_lost_{db}db" for db in (0, 20, 40)),
+        *(f"{kind}_lost_10db" for kind in ("three_tones", "narrow", "sweep_10ms")),
+        "sweep_10ms_lost_10db_220B_25db",
+        *(f"pulses_2pct_lost_{db}db" for db in (0, 10)),
+        *(
+            f"{jammer}_64qam34_220B_25db"
+            for jammer in ("cw_20db", "three_tones_10db", "pulses_2pct_0db")
+        ),
+        "cw_penalty_db", "cw_busy_share",
+        *(f"excisor_clean_{profile}_lost_more" for profile in ("tdl-a", "tdl-c")),
+        "second_burst_heard_mcs1_10db", "second_burst_heard_mcs6_20db",
+        *(f"after_truncated_heard_{db}db" for db in (0, -6)),
+        *(f"deaf_at_onset_of_a_tone_ms_{msps}msps" for msps in (1, 5)),
         "false_pdus",
     },
     "phy_speed": {

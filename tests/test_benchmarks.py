@@ -70,6 +70,14 @@ def test_every_benchmark_is_in_the_list():
     assert set(LACKING) == needy | {"adapters"}, "wheels, which are no Debian packages"
 
 
+def test_what_is_kept_has_the_rows_that_are_printed():
+    for name, rows in ROWS.items():
+        kept = ROOT / "docs/measured" / f"{name}.json"
+        if kept.exists():
+            told = {row["name"] for row in json.loads(kept.read_text())["rows"]}
+            assert told - OPTIONAL == rows, name
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [n if n in SMALL else pytest.param(n, marks=pytest.mark.long) for n in ROWS]

@@ -159,7 +159,8 @@ async def test_commands_go_on_when_the_leader_is_killed(start_fleet):
                 operator.command(ROBOT, "cmd_vel", odom(number), lifespan_ms=1000)
                 await asyncio.sleep(0.02)
             await asyncio.sleep(0.5)
-    assert len(got) == len(set(got))
+    # What the leader sent as it was killed, without a word, the next one sends again.
+    assert {number for number in got if got.count(number) > 1} <= set(range(38, 42))
     missing = sorted(set(range(100)) - set(got))
     assert set(missing) <= set(range(38, 90)), "again within a second"
 
