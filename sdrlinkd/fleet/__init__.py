@@ -6,6 +6,7 @@ This package speaks to the daemon over the bus and the control socket only. It n
 from sdrlinkd.fleet.commands import Commands, Order, Refusal
 from sdrlinkd.fleet.election import Election, score
 from sdrlinkd.fleet.formats import (
+    TERMS,
     Claim,
     Command,
     Fate,
@@ -28,6 +29,7 @@ from sdrlinkd.fleet.subscriber import FleetClient, FleetMessage
 from sdrlinkd.fleet.zenoh_config import make_zenoh_config
 
 __all__ = [
+    "TERMS",
     "Answer",
     "Claim",
     "Command",

@@ -1,6 +1,6 @@
 """Which gateway leads for a robot (fleet document, section 4)."""
 
-from sdrlinkd.fleet.formats import Claim
+from sdrlinkd.fleet.formats import TERMS, Claim, is_later
 
 REPEAT_S = 0.3
 LISTEN_S = 0.5
@@ -31,8 +31,8 @@ class Election:
         """Since when there is no leader; None while there is one."""
         self._better_at: float | None = None
         self._said_at = float("-inf")
-        self._term = 0
-        """The highest term so far."""
+        self._term: int | None = None
+        """The latest term so far; the first that is heard is believed, whatever it is."""
 
     @property
     def score(self) -> float | None:
@@ -68,12 +68,16 @@ class Election:
         """Take another gateway's claim."""
         if claim.gw == self._own_id:
             return
-        self._term = max(self._term, claim.term)
+        if self._term is None or is_later(claim.term, self._term):
+            self._term = claim.term
         leader = self._leader
         if claim.score <= GIVEN_UP:
             self.gone(claim.gw, now)
             return
-        if leader is not None and claim.rank < leader.rank and claim.gw != leader.gw:
+        if leader is not None and leader.beats(claim) and claim.gw != leader.gw:
+            if leader.gw == self._own_id:
+                # Two lead: the other one has to know.
+                self._said_at = float("-inf")
             return
         self._leader, self._leader_at, self._vacant_at = claim, now, None
 
@@ -104,7 +108,8 @@ class Election:
         if not may_claim:
             return None
         self._better_at = self._vacant_at = None
-        self._leader = self._say(self._term + 1, self._score, now)
+        term = 0 if self._term is None else self._term
+        self._leader = self._say((term + 1) % TERMS, self._score, now)
         self._leader_at = now
         return self._leader
 

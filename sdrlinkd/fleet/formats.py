@@ -12,10 +12,12 @@ from msgspec import Meta
 from sdrlinkd.client import MessageName
 
 T = TypeVar("T")
+TERMS = 1 << 32
 MOST_OCTETS = 1024
 """Largest attachment in octets that is read."""
 Gateway = Annotated[int, Meta(ge=0, le=254)]
 Number = Annotated[int, Meta(ge=0, le=1 << 53)]
+Term = Annotated[int, Meta(ge=0, lt=TERMS)]
 Time = Annotated[int, Meta(ge=0, le=(1 << 63) - 1)]
 Text = Annotated[str, Meta(max_length=128)]
 Qos = Literal["", "urgent", "latency", "default", "bulk"]
@@ -64,13 +66,19 @@ class Claim(msgspec.Struct, frozen=True):
     """A gateway's claim to lead for a robot."""
 
     gw: Gateway
-    term: Number
+    term: Term
     score: Annotated[float, Meta(ge=-1, le=2)]
 
-    @property
-    def rank(self) -> tuple[int, float, int]:
-        """Of two claims, the one with the greater rank counts."""
-        return self.term, self.score, -self.gw
+    def beats(self, other: "Claim") -> bool:
+        """Whether this one counts, of two claims."""
+        if is_later(self.term, other.term) != is_later(other.term, self.term):
+            return is_later(self.term, other.term)
+        return (self.score, -self.gw) > (other.score, -other.gw)
+
+
+def is_later(term: int, other: int) -> bool:
+    """Whether a term comes after another: they go around (RFC 1982), so that none is the last."""
+    return 0 < (term - other) % TERMS <= TERMS // 2
 
 
 class Fate(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -1,12 +1,14 @@
 """One gateway leads for each robot: soon, the best one, and again when it goes."""
 
+import itertools
+from copy import copy
 from random import Random
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.fleet import Claim, Election, score
+from sdrlinkd.fleet import TERMS, Claim, Election, score
 from tests.laws import law
 
 LEASE_S = 1.0
@@ -143,6 +145,107 @@ def test_after_any_troubles_exactly_one_leads(seed):
 )  # fmt: skip
 def test_what_counts_is_what_is_lost_and_then_the_snr(per, snr_db, is_):
     assert score(per, snr_db) == pytest.approx(is_)
+
+
+TICK_S = 0.1
+SCORES = {7: 0.8, 8: 0.97, 9: 0.5}
+FORGERS_GW = 200
+# What may be forged: (gateway, term after that of the gateway that hears it, score).
+FORGED = (
+    (FORGERS_GW, 1, 2.0), (FORGERS_GW, TERMS // 2, 2.0), (FORGERS_GW, TERMS // 2 - 1, -1.0),
+    (FORGERS_GW, TERMS // 2 + 1, 2.0), (7, 1, 2.0), (8, 1, -1.0), (8, TERMS // 2 - 1, 2.0),
+)  # fmt: skip
+"""A term ahead by one, by as much as there is, by more: then it is behind."""
+
+
+def term_of(election):
+    """The latest term that a gateway knows; None: none."""
+    return vars(election)["_term"]
+
+
+def seen(elections, now):
+    """What tells states apart: times since, and terms after that of the first gateway."""
+    base = next(filter(None, map(term_of, elections.values())), 0)
+    found = []
+    for each in elections.values():
+        for name, value in vars(each).items():
+            if name == "_leader":
+                found.append(value and (value.gw, (value.term - base) % TERMS, value.score))
+            elif name == "_term":
+                found.append(None if value is None else (value - base) % TERMS)
+            elif name.endswith("_at"):
+                found.append(None if value is None else round(min(30, (now - value) / TICK_S)))
+    return tuple(found)
+
+
+def ticked(elections, now, order, lost=()):
+    """The gateways after one tick: each polls, and the others hear it but for what is lost."""
+    after = {gw: copy(each) for gw, each in elections.items()}
+    for gw in order:
+        after[gw].hear(SCORES[gw], now)
+        claim = after[gw].poll(now)
+        for other in after:
+            if claim is not None and other != gw and (gw, other) not in lost:
+                after[other].claimed(claim, now)
+    return after
+
+
+def faulty(elections, now, order):
+    """(faults, the gateways after a tick with them): a claim is lost, or one is forged."""
+    yield 0, ticked(elections, now, order)
+    ways = [(a, b) for a in order for b in order if a != b]
+    for way in ways:
+        yield 1, ticked(elections, now, order, (way,))
+    for gw, more, its_score in FORGED:
+        for heard_by in (*([each] for each in order), order):
+            hit = {each: copy(election) for each, election in elections.items()}
+            for each in heard_by:
+                term = ((term_of(hit[each]) or 0) + more) % TERMS
+                hit[each].claimed(Claim(gw, term, its_score), now)
+            yield 1, ticked(hit, now, order)
+
+
+def heals(elections, now):
+    """Whether, from now on without faults, one gateway leads within a lease, and goes on."""
+    leaders = []
+    for tick in range(30):
+        elections = ticked(elections, now + tick * TICK_S, list(SCORES))
+        leaders.append(tuple(gw for gw, each in elections.items() if each.leads))
+    # The lease, the wait before a claim, and a tick.
+    settled = leaders[round((LEASE_S + 0.2) / TICK_S) :]
+    agreed = {each.leader for each in elections.values()}
+    return {len(each) for each in settled} == {1} and len(agreed) == 1
+
+
+@pytest.mark.parametrize(
+    ("faults", "ticks"),
+    [
+        (1, 12), pytest.param(2, 14, marks=pytest.mark.slow),
+        pytest.param(3, 8, marks=pytest.mark.long), pytest.param(4, 5, marks=pytest.mark.long),
+    ],
+)  # fmt: skip
+def test_in_every_state_that_faults_lead_to_the_election_heals(faults, ticks):
+    """All orders of three gateways, all places of up to so many claims lost or forged."""
+    start = {gw: Election(gw, LEASE_S, 0.0) for gw in SCORES}
+    states, known, healed = {seen(start, 0.0): (start, 0)}, set(), 0
+    for tick in range(ticks):
+        now, after = tick * TICK_S, {}
+        for elections, spent in states.values():
+            orders = itertools.permutations(SCORES) if tick % 4 == 0 else [tuple(SCORES)]
+            for order in orders:
+                for more, next_ones in faulty(elections, now, order):
+                    if spent + more > faults:
+                        continue
+                    key = seen(next_ones, now)
+                    if key not in after or after[key][1] > spent + more:
+                        after[key] = next_ones, spent + more
+        states = after
+        for key, (elections, _) in states.items():
+            if key not in known:
+                known.add(key)
+                assert heals(elections, now + TICK_S), key
+                healed += 1
+    assert healed > 100
 
 
 def led_by(gw, own_score=0.5, term=3, now=0.0, its_score=0.8):

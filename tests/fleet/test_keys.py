@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from sdrlinkd.client import MessageName
 from sdrlinkd.fleet import (
+    TERMS,
     Claim,
     Command,
     Fate,
@@ -100,7 +101,8 @@ def test_the_longest_attachment_that_is_read():
 
 def test_a_claim_beats_another_by_term_score_and_lower_id():
     claims = [Claim(7, 1, 0.5), Claim(9, 1, 0.6), Claim(8, 1, 0.6), Claim(3, 2, 0.1)]
-    assert sorted(claims, key=lambda each: each.rank) == claims
+    for i, one in enumerate(claims):
+        assert [one.beats(other) for other in claims] == [i > k for k in range(len(claims))]
     assert read_claim(encode(Claim(7, 1, float("nan")))) is None
     assert read_claim(encode(claims[0])) == claims[0]
     fate = Fate(7, "cmd_vel", "desk", None, "taken", "why")
@@ -158,4 +160,14 @@ def test_any_octets_are_read_or_none(octets):
     for read in (read_passed, read_command, read_claim, read_fate, is_passed):
         read(octets)
     claim = read_claim(octets)
-    assert claim is None or claim.rank == claim.rank
+    assert claim is None or not claim.beats(claim)
+
+
+@law(300)
+@given(st.integers(0, TERMS - 1), st.integers(0, TERMS - 1), st.floats(-1, 2), st.integers(0, 3))
+def test_of_two_claims_one_beats_the_other(term, other, its_score, gw):
+    """Also where the terms have gone around, or are as far apart as can be."""
+    for far in (other, (term + TERMS // 2) % TERMS, (term + TERMS // 2 - 1) % TERMS):
+        one, two = Claim(9, term, 0.5), Claim(gw, far, its_score)
+        assert one.beats(two) != two.beats(one)
+    assert Claim(gw, (term + 1) % TERMS, -0.5).beats(Claim(9, term, 2))
