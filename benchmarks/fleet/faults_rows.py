@@ -34,7 +34,8 @@ def _router_killed(seed: int, n: int) -> Row:
         def fail(number: int) -> None:
             if number == n // 2 and where.router is not None:
                 where.router.kill()
-                processes.start_module(stack, "router", ROUTER, where.endpoint)
+                file, *ends = str(where.certificate), where.endpoint, where.door
+                processes.start_module(stack, "router", ROUTER, file, *ends)
 
         found = asyncio.run(drive(where, n, PERIOD_S, fail))
     came = sorted(at[0] for at in found.at_operator.values())

@@ -5,22 +5,18 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import TemporaryDirectory
 
 from benchmarks import processes
 from benchmarks.daemons import is_up, running
 from benchmarks.fleet.pdu_air import PduAir
 from sdrlinkd.config import FleetParams
+from sdrlinkd.keyring import new_authority, zenoh_file
 from sdrlinkd.process import Process
 
 ROBOT = 2
 FLEET = "bench"
 ROUTER, WAN, PLAIN = (f"benchmarks.peers.{each}" for each in ("zenoh_router", "wan", "plain_zenoh"))
-GUARD = (
-    '{access_control: {enabled: true, default_permission: "allow", rules: [], subjects: [], '
-    "policies: []}}"
-)
-"""Rules of Zenoh that let everything pass: on this machine alone, commands are safe."""
 
 
 @dataclass
@@ -29,8 +25,12 @@ class Field:
 
     air: PduAir
     endpoint: str
+    """Where operators' programs connect; on the router's computer, they need no certificate."""
     far_endpoint: str
-    """Where gateways find the router, over the wide-area network."""
+    """Where plain bridges find the router, over the wide-area network."""
+    door: str
+    """The same for gateways, with certificates."""
+    certificate: Path
     folders: dict[int, Path]
     gateways: dict[int, Process]
     router: Process | None
@@ -41,21 +41,28 @@ class Field:
     @property
     def params(self) -> FleetParams:
         """What an operator's program needs to join."""
-        return FleetParams(name=FLEET, connect=[self.endpoint])
+        return FleetParams(name=FLEET, connect=[self.endpoint], zenoh=str(self.certificate))
 
 
-def free_endpoint() -> str:
-    """A TCP endpoint at which nobody listens."""
+def certified(folder: Path) -> Path:
+    """A file of Zenoh's in a folder, with a certificate, for all programs of a team."""
+    file = folder / "zenoh.json5"
+    file.write_text(zenoh_file(new_authority(), "all", days=1))
+    return file
+
+
+def free_endpoint(protocol: str = "tcp") -> str:
+    """An endpoint at which nobody listens."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+        return f"{protocol}/127.0.0.1:{free.getsockname()[1]}"
 
 
 @contextmanager
-def routed(endpoint: str) -> Iterator[Process]:
-    """A Zenoh router at an endpoint."""
+def routed(*endpoints: str, file: str = "") -> Iterator[Process]:
+    """A Zenoh router at endpoints; see `router_config`."""
     with ExitStack() as stack:
-        router = processes.start_module(stack, "router", ROUTER, endpoint)
+        router = processes.start_module(stack, "router", ROUTER, file, *endpoints)
         router.line()
         yield router
 
@@ -70,20 +77,25 @@ def field(
     The gateways are `wan_ms` away from the router. With `routes`, the first one is the router
     itself; with `are_plain`, they are plain bridges to Zenoh. Raises PeerError.
     """
-    endpoint = free_endpoint()
-    far = free_endpoint() if wan_ms else endpoint
+    endpoint, door = free_endpoint(), free_endpoint("tls")
+    far, far_door = endpoint, door
     robots = [ROBOT, *losses]
     with PduAir(robots, seed) as air, ExitStack() as stack:
-        guard = stack.enter_context(_file(GUARD))
-        ends = dict.fromkeys(robots, f'connect = ["{far}"]')
-        if routes:
-            ends[min(losses)] = f'listen = ["{endpoint}"]'
-        more = f'[fleet]\nname = "{FLEET}"\nzenoh = "{guard}"\ndown = ["cmd_vel"]\n'
-        own = {robot: f"{air.settings(robot)}{more}{end}\n" for robot, end in ends.items()}
-        router = None if routes else stack.enter_context(routed(endpoint))
+        file = certified(Path(stack.enter_context(TemporaryDirectory())))
+        router = None
+        if not routes:
+            router = stack.enter_context(routed(endpoint, door, file=str(file)))
         if wan_ms:
-            ports = [each.rpartition(":")[2] for each in (far, endpoint)]
-            processes.start_module(stack, "wan", WAN, *ports, str(wan_ms)).line()
+            far, far_door = free_endpoint(), free_endpoint("tls")
+            for name, way in (("wan", (far, endpoint)), ("wan of ours", (far_door, door))):
+                ports = [each.rpartition(":")[2] for each in way]
+                processes.start_module(stack, name, WAN, *ports, str(wan_ms)).line()
+        ends = dict.fromkeys(robots, f'connect = ["{far_door}"]')
+        if routes:
+            endpoint = door
+            ends[min(losses)] = f'listen = ["{door}"]'
+        more = f'[fleet]\nname = "{FLEET}"\nzenoh = "{file}"\ndown = ["cmd_vel"]\n'
+        own = {robot: f"{air.settings(robot)}{more}{end}\n" for robot, end in ends.items()}
         started = stack.enter_context(
             running("gnuradio", robots, ["odom", "cmd_vel"], "", "", own=own, ready=is_up)
         )
@@ -99,7 +111,7 @@ def field(
                     "--config", str(folder.with_suffix(".toml")),
                 )
             )  # fmt: skip
-        yield Field(air, endpoint, far, started.folders, gateways, router, are_plain)
+        yield Field(air, endpoint, far, door, file, started.folders, gateways, router, are_plain)
 
 
 def start_plain(stack: ExitStack, gateway: int, folder: Path, endpoint: str) -> Process:
@@ -108,11 +120,3 @@ def start_plain(stack: ExitStack, gateway: int, folder: Path, endpoint: str) -> 
     process = processes.start_module(stack, f"plain_{gateway}", PLAIN, *arguments)
     process.line()
     return process
-
-
-@contextmanager
-def _file(text: str) -> Iterator[Path]:
-    with NamedTemporaryFile("w", suffix=".json5") as file:
-        file.write(text)
-        file.flush()
-        yield Path(file.name)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
 KEY_FILE, NEXT_FILE = Path("team.key"), Path("next.key")
 STDIN = Path("-")
+CERTIFICATES = Path("certificates")
 
 key_app = typer.Typer(help="Keys of a team, which seal its PDUs.", no_args_is_help=True)
 app.add_typer(key_app, name="key")
@@ -97,6 +98,30 @@ def install(
         _say(f'nothing is sealed yet: set mode = "seal" in [security] of {config}, at all robots')
         return
     _say(_reloaded(setup))
+
+
+@key_app.command()
+def certificates(
+    names: Annotated[
+        list[str],
+        typer.Argument(help="A name for each gateway, and for each operator.", metavar="NAME…"),
+    ],
+    folder: Annotated[
+        Path, typer.Option("--folder", help="Folder to write to.", metavar="FOLDER")
+    ] = CERTIFICATES,
+    days: Annotated[
+        int, typer.Option("--days", help="Days for which they count.", min=1, max=3650)
+    ] = 730,
+) -> None:
+    """Make certificates, by which gateways and operators know each other over an IP network."""
+    from sdrlinkd.keyring import make_certificates
+
+    for path in make_certificates(folder, names, days):
+        _say(f"wrote {path}")
+    _say(
+        'copy each file to its computer alone, and name it there in [fleet]: zenoh = "NAME.json5"',
+        f"keep {folder} where nobody can read it: it is needed to make more",
+    )
 
 
 @key_app.command()

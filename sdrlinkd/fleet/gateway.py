@@ -23,11 +23,13 @@ from sdrlinkd.fleet.heard_robot import HeardRobot
 from sdrlinkd.fleet.heard_robots import HeardRobots
 from sdrlinkd.fleet.keys import Keys
 from sdrlinkd.fleet.other_gateways import OtherGateways
+from sdrlinkd.fleet.own_doors import check_doors
 from sdrlinkd.fleet.report import BRIDGE, DOWN, UP, Counts, GatewayReport
 from sdrlinkd.fleet.ros import FromRos, RosSide
 from sdrlinkd.fleet.samples import Answer, Sample
 from sdrlinkd.fleet.session import Session, open_session
 from sdrlinkd.fleet.upward import SETTLED_S, UpwardMessages
+from sdrlinkd.fleet.zenoh_config import make_zenoh_config
 from sdrlinkd.reports import Snapshot
 
 TICK_S = 0.05
@@ -83,6 +85,8 @@ class Gateway:
         """Work until cancelled. Raises UserError."""
         keys, session = self._keys, self._session
         session.on_reach = self._note_reach
+        if session.is_reached:
+            self._note_reach(is_reached=True)
         session.subscribe(keys.routes, self._claimed)
         session.subscribe(keys.all_sent, lambda each: self._down.told(each, _now()))
         session.watch(keys.gateways, self._note_token)
@@ -285,8 +289,12 @@ def _now() -> float:
 
 async def run_gateway(setup: Setup, folder: Path) -> None:
     """Run a gateway until cancelled; file names are relative to `folder`. Raises UserError."""
-    session = await open_session(setup.config.fleet, folder)
+    params = setup.config.fleet
+    session = await open_session(params, folder)
     try:
+        if params.down or params.bridge:
+            config = make_zenoh_config(params, folder)
+            await check_doors(session, config, params, setup.node_id)
         with ungrouped():
             await Gateway(setup, session).run()
     finally:

@@ -48,6 +48,11 @@ class Keys:
         return f"{self.prefix}/robot_{robot}/**"
 
     @property
+    def all_commands(self) -> str:
+        """Of all messages of all robots, and of commands to them, and of nothing else."""
+        return f"{self.prefix}/robot_$*/**"
+
+    @property
     def all_messages(self) -> str:
         """Of all messages of all robots."""
         return f"{self.prefix}/**"

@@ -2,22 +2,26 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import zenoh
 
 from sdrlinkd.config import FleetParams
 from sdrlinkd.errors import ConfigError
+from sdrlinkd.fleet.keys import Keys
 
 LOCAL_ROUTER = "tcp/localhost:7447"
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 SAFE_PROTOCOLS = ("tls", "quic")
+_MAKE = "sdrlinkctl key certificates makes them"
 
 
 def make_zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
     """Zenoh's configuration; raises ConfigError.
 
     Where the file given in `zenoh` says whom to connect to, that counts unless `[fleet]` says it. A
-    fleet that sends to robots needs TLS at all endpoints, or access control.
+    fleet that sends to robots needs TLS at all endpoints, and asks who connects for a certificate;
+    or access control that denies by default.
     """
     config = zenoh.Config()
     if params.zenoh:
@@ -46,7 +50,7 @@ def make_zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
     config.insert_json5("connect/retry", json.dumps(RETRY))
     for key in ("down", "bridge"):
         if getattr(params, key):
-            _check_guard(config, key)
+            _check_doors(config, key, Keys(params.name).all_commands)
     return config
 
 
@@ -56,21 +60,75 @@ def _says_where(config: zenoh.Config) -> bool:
     return any(config.get_json(key) != plain.get_json(key) for key in keys)
 
 
-def _check_guard(config: zenoh.Config, key: str) -> None:
-    """Refuse to send to robots what anybody on the network may have put. Raises ConfigError."""
-    if json.loads(config.get_json("access_control")).get("enabled"):
-        return
-    given = [*_endpoints(config, "connect"), *_endpoints(config, "listen")]
-    open_ones = [each for each in given if each.split("/")[0] not in SAFE_PROTOCOLS]
-    if open_ones or not given:
+def _check_doors(config: zenoh.Config, key: str, robots: str) -> None:
+    """Refuse to send to robots what anybody on the network may have put. Raises ConfigError.
+
+    `robots` is the key at which commands to robots are put.
+    """
+    listen, connect = endpoints(config, "listen"), endpoints(config, "connect")
+    open_ones = [each for each in connect if not _is_tls(each)]
+    if open_ones or not (listen or connect):
         raise ConfigError(
             f"fleet.{key} sends to robots what others put on Zenoh, and "
-            f'"{(open_ones or ["…"])[0]}" is open to everybody on the network; use tls/ '
-            "endpoints, or switch on access control in the file that fleet.zenoh names"
+            f'"{(open_ones or ["…"])[0]}" is open to everybody on the network; use tls/ or quic/ '
+            f"endpoints, and certificates: {_MAKE}"
+        )
+    asks = tls_setting(config, "enable_mtls") and authority(config)
+    if not listen or (asks and all(map(_is_tls, listen))):
+        return
+    rules = json.loads(config.get_json("access_control"))
+    if not rules.get("enabled"):
+        raise ConfigError(
+            f"fleet.{key} sends to robots what others put on Zenoh, and anybody may connect to "
+            f'"{listen[0]}"; use tls/ or quic/ endpoints where transport/link/tls has enable_mtls '
+            f"and a root_ca_certificate ({_MAKE}), or access_control that denies by default"
+        )
+    if fault := _fault(rules, robots):
+        raise ConfigError(
+            f"fleet.{key} sends to robots what others put on Zenoh, and access_control {fault}"
         )
 
 
-def _endpoints(config: zenoh.Config, end: str) -> list[str]:
+def tls_setting(config: zenoh.Config, name: str) -> object:
+    """A setting of TLS; what is secret is shown only if it is asked for by its own name."""
+    return json.loads(config.get_json(f"transport/link/tls/{name}"))
+
+
+def authority(config: zenoh.Config) -> dict[str, object]:
+    """Whose certificates count: the settings that say so, if any."""
+    names = ("root_ca_certificate", "root_ca_certificate_base64")
+    found = {name: tls_setting(config, name) for name in names}
+    return {name: value for name, value in found.items() if value}
+
+
+def _is_tls(endpoint: str) -> bool:
+    return endpoint.split("/")[0] in SAFE_PROTOCOLS
+
+
+def _fault(rules: dict[str, Any], robots: str) -> str:
+    """Why rules of access control let anybody command robots; empty if they do not."""
+    if rules.get("default_permission") != "deny":
+        return f'has default_permission {rules.get("default_permission")!r}; allowed: "deny"'
+    subjects = {each["id"]: each for each in rules.get("subjects") or ()}
+    allowing = {
+        each["id"]
+        for each in rules.get("rules") or ()
+        if each["permission"] == "allow"
+        and "put" in each["messages"]
+        and any(zenoh.KeyExpr(key).intersects(zenoh.KeyExpr(robots)) for key in each["key_exprs"])
+    }
+    for policy in rules.get("policies") or ():
+        for name in policy["subjects"] if allowing & {*policy["rules"]} else ():
+            subject = subjects.get(name, {})
+            if not (subject.get("cert_common_names") or subject.get("usernames")):
+                return (
+                    f"lets subject {name!r} put at {robots}, who may be anybody; allowed: subjects "
+                    "with cert_common_names or usernames"
+                )
+    return ""
+
+
+def endpoints(config: zenoh.Config, end: str) -> list[str]:
     """All endpoints of one kind, however the file groups them by mode."""
     given = json.loads(config.get_json(f"{end}/endpoints"))
     groups = given.values() if isinstance(given, dict) else [given]

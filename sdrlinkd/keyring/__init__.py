@@ -1,9 +1,10 @@
-"""Keys and key times on disk: the only place that reads and writes them.
+"""Keys, key times and certificates on disk: the only place that reads and writes them.
 
-This package owns the key file of a robot and the state that must survive a restart. It decides
-nothing about PDUs: `sealing` does.
+This package owns the key file of a robot, the state that must survive a restart, and the
+certificates of a team. It decides nothing about PDUs: `sealing` does.
 """
 
+from sdrlinkd.keyring.certificates import make_certificates, new_authority, zenoh_file
 from sdrlinkd.keyring.files import (
     CREDENTIAL,
     KeyFile,
@@ -29,10 +30,13 @@ __all__ = [
     "create_key_file",
     "key_file_text",
     "load_keys",
+    "make_certificates",
+    "new_authority",
     "new_key",
     "parse_key_file",
     "read_key_file",
     "state_dir",
     "words_of",
     "write_key_file",
+    "zenoh_file",
 ]

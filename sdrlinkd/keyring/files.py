@@ -113,10 +113,15 @@ def key_file_text(keys: KeyFile) -> str:
 
 def create_key_file(path: Path, keys: KeyFile) -> None:
     """Write a new key file for its owner alone. Raises UserError if there is one already."""
+    create_secret(path, key_file_text(keys).encode())
+
+
+def create_secret(path: Path, text: bytes) -> None:
+    """Write a new file for its owner alone. Raises UserError if there is one already."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     try:
-        with os.fdopen(os.open(path, flags, 0o600), "w") as file:
-            file.write(key_file_text(keys))
+        with os.fdopen(os.open(path, flags, 0o600), "wb") as file:
+            file.write(text)
     except FileExistsError:
         raise UserError(f"{path}: there already; allowed: the name of a new file") from None
     except OSError as error:

@@ -7,7 +7,7 @@ from typing import TypeVar
 import zenoh
 import zmq
 
-from benchmarks.fleet.field import GUARD, free_endpoint
+from benchmarks.fleet.field import free_endpoint
 from benchmarks.peers.zenoh_node import configured
 from sdrlinkd.bus import Bus, RuntimeDirectory
 from sdrlinkd.config import FleetParams, make_setup, parse_config
@@ -15,6 +15,7 @@ from sdrlinkd.control import Control, Verb
 from sdrlinkd.errors import UserError
 from sdrlinkd.fleet import open_session
 from sdrlinkd.fleet.testing import Putter
+from sdrlinkd.keyring import new_authority, zenoh_file
 from sdrlinkd.link import Delivered, HeardTopic, MessageName, Verdict
 from sdrlinkd.wire import Topic
 from tests import reported
@@ -23,6 +24,8 @@ from tests.bus.programs import REGISTRY, Ingress
 T = TypeVar("T")
 CDR = b"\0\1\0\0data"
 OWN, ROBOT = 7, 2
+CERTIFICATE = zenoh_file(new_authority(), "all", 1)
+"""A file of Zenoh's."""
 PATIENCE_S = 10.0
 """Time in s after which a wait was in vain."""
 
@@ -46,7 +49,7 @@ class Daemon:
     """The bus and the control socket of gateway OWN's daemon, with a link that takes notes."""
 
     def __init__(self, folder, more=""):
-        (folder / "zenoh.json5").write_text(GUARD)
+        (folder / "zenoh.json5").write_text(CERTIFICATE)
         text = (
             f'auto = true\nnamespace = "robot_{OWN}"\nregistry = "{REGISTRY}"\n{more}\n'
             f'[bus]\nruntime_dir = "{folder}"\n'
@@ -135,8 +138,8 @@ class Daemon:
 class Network:
     """A session of the product that routes, and a plain node of Zenoh beside it."""
 
-    def __init__(self):
-        self.endpoint = free_endpoint()
+    def __init__(self, protocol="tcp"):
+        self.endpoint = free_endpoint(protocol)
         self.near = None
         self.far = None
         self.came = []
@@ -150,7 +153,8 @@ class Network:
 
     async def join(self, *keys):
         """The plain node joins, and hears what is put at `keys`."""
-        config = configured(mode="client", connect=[self.endpoint])
+        config = zenoh.Config.from_json5(CERTIFICATE)
+        config = configured(config, mode="client", connect=[self.endpoint])
         self.far = await asyncio.to_thread(zenoh.open, config)
         for key in keys:
             self._kept.append(self.far.declare_subscriber(key, self.came.append))

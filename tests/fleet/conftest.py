@@ -6,7 +6,7 @@ import msgspec
 import pytest
 import zenoh
 
-from benchmarks.fleet.field import GUARD, free_endpoint
+from benchmarks.fleet.field import certified, free_endpoint
 from benchmarks.fleet.pdu_air import PduAir
 from benchmarks.peers.zenoh_router import router_config
 from sdrlinkd.config import FleetParams
@@ -18,14 +18,18 @@ ROBOT, FIRST, SECOND = 2, 7, 8
 
 
 class Router:
-    """A Zenoh router that can be stopped and started again at the same port."""
+    """A Zenoh router that can be stopped and started again at the same ports.
 
-    def __init__(self):
-        self.endpoint = free_endpoint()
+    Programs on its own computer use `endpoint`; those that connect to `door` need a certificate.
+    """
+
+    def __init__(self, folder):
+        self.endpoint, self.door = free_endpoint(), free_endpoint("tls")
+        self.file = str(certified(folder))
         self.session = None
 
     def start(self):
-        self.session = zenoh.open(router_config(self.endpoint))
+        self.session = zenoh.open(router_config(self.endpoint, self.door, file=self.file))
 
     def stop(self):
         if self.session is not None:
@@ -43,19 +47,18 @@ class Fleet:
     def __init__(self, folder):
         self.folder = folder
         self.air = PduAir((ROBOT, FIRST, SECOND))
-        self.router = Router()
+        self.router = Router(folder)
         self.gateways = {}
         self.daemons = {}
 
     def start(self, start_daemon, more, top=""):
         self.router.start()
-        (self.folder / "zenoh.json5").write_text(GUARD)
         for robot in (ROBOT, FIRST, SECOND):
             self.daemons[robot] = start_daemon(
                 f'{top}namespace = "robot_{robot}"\nbackend = "gnuradio"\n'
                 f"{self.air.settings(robot)}"
-                f'[fleet]\nname = "mine"\nconnect = ["{self.router.endpoint}"]\n'
-                f'zenoh = "{self.folder / "zenoh.json5"}"\n{more}'
+                f'[fleet]\nname = "mine"\nconnect = ["{self.router.door}"]\n'
+                f'zenoh = "{self.router.file}"\n{more}'
             )
         self.gateways = {gateway: self.gateway(gateway) for gateway in (FIRST, SECOND)}
         wait_for(lambda: all(self.hears(gateway) for gateway in self.gateways))

@@ -6,7 +6,6 @@ import threading
 import msgspec
 import pytest
 
-from benchmarks.fleet.field import GUARD
 from benchmarks.fleet.pdu_air import PduAir
 from sdrlinkd.client import NoDaemonError, Publisher, RefusedError, Subscriber
 from sdrlinkd.fleet import GatewayReport, Passed, encode
@@ -31,10 +30,9 @@ class Islands:
     def __init__(self, folder, start_daemon, stack):
         self.folder = folder
         self.airs = {robots: stack.enter_context(PduAir(robots)) for robots in (NEAR, FAR)}
-        self.router = Router()
+        self.router = Router(folder)
         self.router.start()
         stack.callback(self.router.stop)
-        (folder / "zenoh.json5").write_text(GUARD)
         self.stack = stack
         self.start_daemon = start_daemon
         self.daemons = {}
@@ -46,8 +44,8 @@ class Islands:
                 self.daemons[robot] = self.start_daemon(
                     f'auto = true\nnamespace = "robot_{robot}"\nbackend = "gnuradio"\n'
                     f'{air.settings(robot)}[fleet]\nname = "mine"\n'
-                    f'connect = ["{self.router.endpoint}"]\nbridge = {allowed}\n'
-                    f'zenoh = "{self.folder / "zenoh.json5"}"\n{more}{at_4 if robot == 4 else ""}'
+                    f'connect = ["{self.router.door}"]\nbridge = {allowed}\n'
+                    f'zenoh = "{self.router.file}"\n{more}{at_4 if robot == 4 else ""}'
                 )
         for gateway in GATEWAYS:
             self.gateways[gateway] = self.gateway(gateway)

@@ -220,8 +220,8 @@ def heals(elections, now):
 @pytest.mark.parametrize(
     ("faults", "ticks"),
     [
-        (1, 12), pytest.param(2, 14, marks=pytest.mark.slow),
-        pytest.param(3, 8, marks=pytest.mark.long), pytest.param(4, 5, marks=pytest.mark.long),
+        (1, 12), pytest.param(2, 7, marks=pytest.mark.slow),
+        pytest.param(2, 14, marks=pytest.mark.long), pytest.param(4, 5, marks=pytest.mark.long),
     ],
 )  # fmt: skip
 def test_in_every_state_that_faults_lead_to_the_election_heals(faults, ticks):

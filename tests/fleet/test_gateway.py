@@ -169,4 +169,4 @@ def test_nothing_goes_down_over_an_open_network(start_daemon, tmp_path):
     daemon = start_daemon('[fleet]\ndown = ["cmd_vel"]\nconnect = ["tcp/10.0.0.1:7447"]\n')
     with Process(module("sdrlinkd.cli.gateway", "--config", daemon.config)) as process:
         assert process.wait() == 2
-        assert "is open to everybody on the network; use tls/ endpoints" in process.err()
+        assert "is open to everybody on the network; use tls/ or quic/ endpoints" in process.err()

@@ -39,7 +39,7 @@ class Joined:
     """Gateway 7 between its daemon and a plain node of Zenoh."""
 
     def __init__(self, folder, more, *, is_read):
-        self.network = Network()
+        self.network = Network("tls")
         self.daemon = Daemon(
             folder,
             '[fleet]\nname = "mine"\nzenoh = "zenoh.json5"\n'

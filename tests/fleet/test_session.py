@@ -13,14 +13,15 @@ from sdrlinkd.config import FleetParams
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.fleet import Answer, make_zenoh_config, open_session
 from sdrlinkd.fleet.testing import AT_ONCE, MOST_QUERIES, MOST_SAMPLES
+from sdrlinkd.keyring import new_authority, zenoh_file
 from tests.fleet.beside import Network, until, until_found
 from tests.fleet.conftest import Router
 from tests.waiting import wait_for
 
 
 @pytest.fixture
-def router():
-    found = Router()
+def router(tmp_path):
+    found = Router(tmp_path)
     found.start()
     yield found
     found.stop()
@@ -328,8 +329,12 @@ async def test_a_router_that_is_away_is_said_once(tmp_path, caplog, monkeypatch)
 @pytest.mark.parametrize(
     ("params", "said"),
     [
-        ({"down": ["cmd_vel"]}, "tcp/localhost:7447"),
-        ({"down": ["cmd_vel"], "connect": ["tls/a:1"], "listen": ["tcp/b:2"]}, "tcp/b:2"),
+        ({"down": ["cmd_vel"]}, '"tcp/localhost:7447" is open to everybody'),
+        (
+            {"down": ["cmd_vel"], "connect": ["tls/a:1"], "listen": ["tcp/b:2"]},
+            'anybody may connect to "tcp/b:2"; use tls/ or quic/ endpoints where',
+        ),
+        ({"down": ["cmd_vel"], "listen": ["tls/b:2"]}, 'anybody may connect to "tls/b:2"'),
         ({"bridge": ["*"], "connect": ["tcp/a:1"]}, "bridge sends to robots what others put"),
         ({"zenoh": "absent.json5"}, r"fleet.zenoh: \S+/absent.json5: [^/]*\Z"),
     ],
@@ -347,10 +352,54 @@ def test_no_memory_is_shared(tmp_path):
         assert config.get_json("transport/shared_memory/enabled") == "false"
 
 
-def test_tls_or_access_control_will_do(tmp_path):
+def test_certificates_at_both_ends_will_do(tmp_path):
     make_zenoh_config(FleetParams(down=["cmd_vel"], connect=["tls/a:1", "quic/b:2"]), tmp_path)
-    (tmp_path / "acl.json5").write_text("{access_control: {enabled: true}}")
-    make_zenoh_config(FleetParams(down=["cmd_vel"], zenoh="acl.json5"), tmp_path)
+    (tmp_path / "a.json5").write_text(zenoh_file(new_authority(), "a", 1))
+    for protocol in ("tls", "quic"):
+        params = FleetParams(down=["cmd_vel"], listen=[f"{protocol}/b:2"], zenoh="a.json5")
+        make_zenoh_config(params, tmp_path)
+
+
+def rules_for(subject, key="sdrlink/fleet/robot_$*/**", default="deny", messages=("put",)):
+    """Rules of access control by which a subject may put at a key."""
+    rule = {
+        "id": "r", "permission": "allow", "flows": ["ingress"], "messages": list(messages),
+        "key_exprs": [key],
+    }  # fmt: skip
+    return {
+        "enabled": True, "default_permission": default, "rules": [rule],
+        "subjects": [{"id": "s", **subject}], "policies": [{"rules": ["r"], "subjects": ["s"]}],
+    }  # fmt: skip
+
+
+NAMED = {"cert_common_names": ["desk"]}
+
+
+@pytest.mark.parametrize(
+    ("rules", "fault"),
+    [
+        (rules_for(NAMED), ""), (rules_for({"usernames": ["ann"]}), ""),
+        (rules_for({}, "sdrlink/fleet/@gw/**"), ""), (rules_for({}, "sdrlink/other/**"), ""),
+        (rules_for({}, messages=["declare_subscriber"]), ""),
+        (rules_for(NAMED, default="allow"), "has default_permission 'allow'; allowed: \"deny\""),
+        (rules_for({}), "lets subject 's' put at sdrlink/fleet/robot_"),
+        (rules_for({"interfaces": ["eth0"]}, "**"), "who may be anybody; allowed: subjects with"),
+        (rules_for({"zids": ["ab"]}, "sdrlink/fleet/robot_2/cmd_vel"), "who may be anybody"),
+        (rules_for({"link_protocols": ["tls"]}, "sdrlink/*/robot_2/**"), "who may be anybody"),
+        (
+            {"enabled": True, "default_permission": "allow", "rules": [], "subjects": [],
+             "policies": []}, "has default_permission 'allow'",
+        ),
+    ],
+)  # fmt: skip
+def test_rules_of_access_control_are_read(rules, fault, tmp_path):
+    (tmp_path / "acl.json5").write_text(json.dumps({"access_control": rules}))
+    params = FleetParams(down=["cmd_vel"], listen=["tcp/a:1"], zenoh="acl.json5")
+    if not fault:
+        make_zenoh_config(params, tmp_path)
+        return
+    with pytest.raises(ConfigError, match=f"fleet.down sends .* access_control .*{fault}"):
+        make_zenoh_config(params, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -399,12 +448,16 @@ def test_who_is_connected_to_and_who_is_listened_for(given, mode, connect, liste
     assert json.loads(config.get_json("timestamping/enabled")) is True
 
 
+ASKS = 'transport: {link: {tls: {enable_mtls: true, root_ca_certificate: "ca.pem"}}}'
+
+
 @pytest.mark.parametrize(
     ("file", "open_one"),
     [
         ("{listen: {endpoints: []}}", "…"),
         ('{listen: {endpoints: {peer: ["tls/a:1"], router: ["tcp/b:2"]}}}', "tcp/b:2"),
-        ('{listen: {endpoints: {peer: ["tls/a:1"]}}}', ""),
+        ('{listen: {endpoints: {peer: ["tls/a:1"]}}}', "tls/a:1"),
+        (f'{{listen: {{endpoints: {{peer: ["tls/a:1"]}}}}, {ASKS}}}', ""),
         ('{listen: {endpoints: []}, connect: {endpoints: ["udp/a:1"]}}', "udp/a:1"),
     ],
 )  # fmt: skip
@@ -414,5 +467,7 @@ def test_every_endpoint_in_a_file_of_zenoh_has_to_be_safe(file, open_one, tmp_pa
     if not open_one:
         make_zenoh_config(params, tmp_path)
         return
-    with pytest.raises(ConfigError, match=f'fleet.bridge sends .*"{open_one}" is open to'):
+    with pytest.raises(
+        ConfigError, match=f'fleet.bridge sends .*"{open_one}"( is open to|; use tls/)'
+    ):
         make_zenoh_config(params, tmp_path)

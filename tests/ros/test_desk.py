@@ -10,7 +10,6 @@ import pytest
 import zenoh
 from zenoh_ros2_sdk import ROS2ServiceClient
 
-from benchmarks.fleet.field import GUARD
 from sdrlinkd.fleet.testing import Attachment, Node, Qos, Role
 from sdrlinkd.process import Process, module
 from tests.fleet.conftest import Router
@@ -32,8 +31,8 @@ HEAD = b"\0\1\0\0"
 class Desk:
     """A Zenoh router, and what a node needs to call over it."""
 
-    def __init__(self):
-        self.router = Router()
+    def __init__(self, folder):
+        self.router = Router(folder)
         self.router.start()
         self.port = int(self.router.endpoint.rpartition(":")[2])
         self.numbers = 0
@@ -61,11 +60,10 @@ class Desk:
 
 @pytest.fixture
 def desk(start_daemon, start, hub, tmp_path):
-    found = Desk()
-    (tmp_path / "zenoh.json5").write_text(GUARD)
+    found = Desk(tmp_path)
     fleet = (
-        f'[fleet]\nconnect = ["{found.router.endpoint}"]\nros_domain = {DOMAIN}\n'
-        f'zenoh = "{tmp_path / "zenoh.json5"}"\ndown = ["set", "fibonacci"]\n'
+        f'[fleet]\nconnect = ["{found.router.door}"]\nros_domain = {DOMAIN}\n'
+        f'zenoh = "{found.router.file}"\ndown = ["set", "fibonacci"]\n'
     )
     found.robot = Robot(start, start_daemon(config(hub, 1)), *ALLOW).bridged()
     base = start_daemon(config(hub, 2, fleet))

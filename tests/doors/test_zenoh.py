@@ -1,0 +1,187 @@
+"""Zenoh's door: who may command a robot through a gateway."""
+
+import asyncio
+import contextlib
+import json
+import time
+
+import pytest
+import zenoh
+
+from benchmarks.fleet.field import free_endpoint
+from benchmarks.fleet.pdu_air import PduAir
+from benchmarks.peers.zenoh_node import configured
+from benchmarks.peers.zenoh_router import router_config
+from sdrlinkd.client import Subscriber
+from sdrlinkd.config import FleetParams
+from sdrlinkd.fleet import FleetClient
+from sdrlinkd.keyring import new_authority, zenoh_file
+from sdrlinkd.process import Process, module
+from tests.waiting import wait_for
+
+ROBOT, BASE = 2, 7
+MINE, FORGED = b"\0\1\0\0mine", b"\0\1\0\0forged"
+TLS = "transport/link/tls"
+TEAM, STRANGERS = new_authority(), new_authority()
+# The text of a client's file, or None if it has none.
+FILES = {
+    "no certificate": None,
+    "another team's certificate": zenoh_file(STRANGERS, "desk", 1)
+    .replace("root_ca_certificate_base64", "_")
+    .replace('"_"', '"root_ca_certificate_base64"'),
+    "a certificate that has ended": zenoh_file(TEAM, "desk", -0.5),
+    "a certificate": zenoh_file(TEAM, "desk", 1),
+}
+FOR_ALL = [
+    ("tls", "no certificate"),
+    *(
+        pytest.param(protocol, who, marks=pytest.mark.long)
+        for protocol in ("tls", "quic")
+        for who in [*FILES][:3]
+        if (protocol, who) != ("tls", "no certificate")
+    ),
+]
+
+
+class Base:
+    """A robot, and a base station whose gateway listens with certificates."""
+
+    def __init__(self, folder, start_daemon, stack):
+        self.endpoints = {each: free_endpoint(each) for each in ("tls", "quic")}
+        file = folder / "base.json5"
+        file.write_text(zenoh_file(TEAM, "base", 1))
+        air = stack.enter_context(PduAir((ROBOT, BASE)))
+        fleet = (
+            f'[fleet]\nname = "mine"\nlisten = {json.dumps([*self.endpoints.values()])}\n'
+            f'zenoh = "{file}"\ndown = ["cmd_vel"]\n'
+        )
+        self.robot, base = (
+            start_daemon(
+                f'namespace = "robot_{each}"\nbackend = "gnuradio"\n{air.settings(each)}{more}'
+            )
+            for each, more in ((ROBOT, ""), (BASE, fleet))
+        )
+        self.gateway = stack.enter_context(
+            Process(module("sdrlinkd.cli.gateway", "--config", base.config), name="gateway")
+        )
+        self.file = folder / "desk.json5"
+        self.commands = stack.enter_context(
+            Subscriber(f"/rx_robot_{BASE}/cmd_vel", runtime_dir=self.robot.directory)
+        )
+
+    def hears(self, command, within_s):
+        """Whether the robot hears a command within so many seconds."""
+        over = time.monotonic() + within_s
+        with contextlib.suppress(TimeoutError):
+            while (left := over - time.monotonic()) > 0:
+                message = self.commands.receive(left)
+                if message is not None and message.payload == command:
+                    return True
+        return False
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory, request):
+    from tests.conftest import daemons
+
+    with contextlib.ExitStack() as stack:
+        start = stack.enter_context(daemons(tmp_path_factory))
+        yield Base(tmp_path_factory.mktemp("door"), start, stack)
+
+
+def put_as(text, endpoint, folder):
+    """Command robot ROBOT as a program with such a file; whether it could connect."""
+    config = zenoh.Config()
+    if text is not None:
+        (folder / "client.json5").write_text(text)
+        config = zenoh.Config.from_file(str(folder / "client.json5"))
+    config = configured(config, mode="client", connect=[endpoint])
+    if text is None:
+        # What a gateway's certificate is signed with is no secret.
+        ours = zenoh.Config.from_file(str(folder / "team.json5"))
+        name = f"{TLS}/root_ca_certificate_base64"
+        config.insert_json5(name, ours.get_json(name))
+        config.insert_json5(f"{TLS}/verify_name_on_connect", "false")
+    config.insert_json5("connect/timeout_ms", "1000")
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError:
+        return False
+    with session:
+        for _ in range(10):
+            session.put(f"sdrlink/mine/robot_{ROBOT}/cmd_vel", FORGED)
+            time.sleep(0.05)
+    return True
+
+
+async def commanded_by(params, folder, base):
+    """Whether a command of an operator's program comes to the robot."""
+    async with FleetClient(params, folder) as operator:
+        for _ in range(50):
+            operator.command(ROBOT, "cmd_vel", MINE, lifespan_ms=1000)
+            if await asyncio.to_thread(base.hears, MINE, 0.2):
+                return True
+    return False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("protocol", "who"), FOR_ALL)
+def test_who_has_no_right_commands_no_robot_and_who_has_it_does(protocol, who, base, tmp_path):
+    """Each client in its own way, and then a member of the team: an effect is what counts."""
+    endpoint = base.endpoints[protocol]
+    (tmp_path / "team.json5").write_text(FILES["a certificate"])
+    params = FleetParams(name="mine", connect=[endpoint], zenoh="team.json5")
+    assert asyncio.run(commanded_by(params, tmp_path, base))
+    put_as(FILES[who], endpoint, tmp_path)
+    assert not base.hears(FORGED, 1.0)
+    assert asyncio.run(commanded_by(params, tmp_path, base))
+    assert base.gateway.is_running
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rules", [None, pytest.param("any", marks=pytest.mark.long)])
+def test_a_gateway_does_not_start_at_a_router_that_lets_strangers_command(
+    rules, start_daemon, tmp_path
+):
+    """The router asks nobody for a certificate; what it says of itself is not asked."""
+    endpoint = free_endpoint("tls")
+    file = tmp_path / "team.json5"
+    file.write_text(FILES["a certificate"])
+    config = router_config(endpoint, file=str(file))
+    config.insert_json5(f"{TLS}/enable_mtls", "false")
+    if rules is not None:
+        may_put = {
+            "id": "r", "permission": "allow", "flows": ["ingress", "egress"],
+            "messages": ["put", "declare_subscriber"], "key_exprs": ["sdrlink/**"],
+        }  # fmt: skip
+        told = {
+            "enabled": True, "default_permission": "deny", "rules": [may_put],
+            "subjects": [{"id": "s"}], "policies": [{"rules": ["r"], "subjects": ["s"]}],
+        }  # fmt: skip
+        config.insert_json5("access_control", json.dumps(told))
+    daemon = start_daemon(
+        f'[fleet]\nname = "mine"\nconnect = ["{endpoint}"]\nzenoh = "{file}"\ndown = ["cmd_*"]\n'
+    )
+    with (
+        zenoh.open(config),
+        Process(module("sdrlinkd.cli.gateway", "--config", daemon.config)) as gateway,
+    ):
+        assert gateway.wait() == 2
+        assert f'"{endpoint}": a program without a certificate may command' in gateway.err()
+
+
+@pytest.mark.slow
+def test_a_router_that_asks_for_certificates_is_named_once(start_daemon, tmp_path):
+    endpoint = free_endpoint("tls")
+    file = tmp_path / "team.json5"
+    file.write_text(FILES["a certificate"])
+    daemon = start_daemon(
+        f'[fleet]\nname = "mine"\nconnect = ["{endpoint}"]\nzenoh = "{file}"\ndown = ["*"]\n'
+    )
+    with (
+        zenoh.open(router_config(endpoint, file=str(file))),
+        Process(module("sdrlinkd.cli.gateway", "--config", daemon.config)) as gateway,
+    ):
+        wait_for(lambda: "decides who may command" in gateway.err() and gateway.is_running)
+        wait_for(lambda: "joined fleet" in gateway.err())
+        assert gateway.err().count("decides who may command robots") == 1
