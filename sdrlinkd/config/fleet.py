@@ -23,16 +23,16 @@ class FleetParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     listen: list[Endpoint] = []
     """Zenoh endpoints to listen at; with any, this gateway is a Zenoh router itself."""
     zenoh: str = ""
-    """File with more of Zenoh's own configuration (JSON5), for TLS and access control, relative to
-    the configuration file."""
+    """File with more of Zenoh's own configuration (JSON5), such as `sdrlinkctl key certificates`
+    writes, relative to the configuration file."""
     up: list[str] = []
     """Patterns of the topics of robots that are put on Zenoh; []: all."""
     down: list[str] = []
-    """Patterns of the topics that operators may send to robots; needs TLS or access control."""
+    """Patterns of the topics that operators may send to robots; needs certificates."""
     bridge: list[str] = []
     """Patterns of the topics that this gateway's daemon sends to its robots for robots that only
-    other gateways hear, so that both are one team; needs `auto = true`, and TLS or access
-    control."""
+    other gateways hear, so that both are one team; needs `auto = true`, and
+    certificates."""
     ros_domain: Annotated[int, Meta(ge=0, le=232)] | None = None
     """ROS domain id in which robots appear to ROS 2 nodes on rmw_zenoh; absent: in none."""
     lease_s: Annotated[float, Meta(ge=0.5, le=60)] = 1.0
