@@ -3,7 +3,7 @@
 from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
 from sdrlinkd.adapters.chrony import ChronySocket
 from sdrlinkd.adapters.due import Due, due_messages
-from sdrlinkd.adapters.fields import cdr_from_fields
+from sdrlinkd.adapters.fields import cdr_from_fields, check_cdr
 from sdrlinkd.adapters.mcap_file import McapFile, Recorded
 from sdrlinkd.adapters.message_types import MessageTypes
 from sdrlinkd.adapters.pacing import first_seconds, from_second, paced
@@ -33,6 +33,7 @@ __all__ = [
     "TopicSummary",
     "Transforms",
     "cdr_from_fields",
+    "check_cdr",
     "definition",
     "due_messages",
     "empty",

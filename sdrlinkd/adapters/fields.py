@@ -1,6 +1,8 @@
 """Makes messages from fields that people write in TOML or YAML, checked against their type."""
 
+import dataclasses
 import difflib
+import math
 import struct
 from collections.abc import Mapping
 from typing import Any
@@ -8,8 +10,8 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
-from sdrlinkd.adapters.typestore import empty, ros2_types, to_cdr
-from sdrlinkd.errors import UserError
+from sdrlinkd.adapters.typestore import empty, from_cdr, knows, ros2_types, to_cdr
+from sdrlinkd.errors import CdrError, UserError
 
 _TEXT = ("string", "wstring")
 _NUMBERS = {
@@ -25,6 +27,33 @@ def cdr_from_fields(kind: str, given: Mapping[Any, Any], where: str) -> bytes:
     allowed.
     """
     return to_cdr(_message(kind, given, where), kind)
+
+
+def check_cdr(kind: str, cdr: bytes, where: str) -> None:
+    """Raise UserError if octets are no CDR of `kind`, or have a number that is not finite.
+
+    Of a type that this host does not know, nothing can be said.
+    """
+    if not knows(kind):
+        return
+    try:
+        message = from_cdr(cdr, kind)
+    except CdrError as error:
+        raise UserError(f"{where}: {error}") from None
+    if not _is_finite(message):
+        raise UserError(f"{where}: a number is not finite; allowed: finite numbers")
+
+
+def _is_finite(value: Any) -> bool:  # noqa: ANN401
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind != "f" or bool(np.isfinite(value).all())
+    if isinstance(value, list):
+        return all(map(_is_finite, value))
+    if dataclasses.is_dataclass(value):
+        return all(_is_finite(getattr(value, each.name)) for each in dataclasses.fields(value))
+    return True
 
 
 def _message(kind: str, given: Any, where: str) -> Any:  # noqa: ANN401

@@ -3,7 +3,9 @@
 import asyncio
 import ipaddress
 import logging
+import os
 from typing import Annotated
+from urllib.parse import urlencode
 
 import typer
 import uvloop
@@ -11,10 +13,12 @@ import uvloop
 from sdrlinkd.cli.app import RuntimeDir, app
 from sdrlinkd.cli.completion import heard_names
 from sdrlinkd.cli.listening import host_and_port
+from sdrlinkd.doors import new_token
 from sdrlinkd.extras import needs
 from sdrlinkd.journal import log_to_stderr
 
 LISTEN = "127.0.0.1:8765"
+TOKEN = "SDRLINK_FOXGLOVE_TOKEN"  # noqa: S105 (the name of a variable)
 
 bridges = typer.Typer(
     help="Show the link and what it carries in other programs.", no_args_is_help=True
@@ -41,7 +45,18 @@ def foxglove(
         typer.Option(
             metavar="PATTERN",
             help="Topics that people at Foxglove may send to robots, such as '/robot_*/cmd_vel'; "
-            "repeatable; default: none.",
+            "repeatable; asks for a token; default: none.",
+        ),
+    ] = None,
+    token: Annotated[
+        bool, typer.Option("--token", help=f"Ask for a token: that in {TOKEN}, else a new one.")
+    ] = False,
+    allow_origin: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ORIGIN",
+            help="Origin of a page that may connect without a token, besides app.foxglove.dev and "
+            "those of this computer; repeatable.",
         ),
     ] = None,
     listen: Annotated[
@@ -51,32 +66,38 @@ def foxglove(
 ) -> None:
     """Serve received topics, the link's state and robots' places to Foxglove until Ctrl-C."""
     with needs("foxglove"):
-        from sdrlinkd.foxglove import run_bridge
+        from sdrlinkd.foxglove import FOXGLOVE, Rules, run_bridge
     host, port = host_and_port(listen, "--listen", LISTEN)
     patterns = publish or []
+    rules = Rules(
+        _is_local(host),
+        (os.environ.get(TOKEN) or new_token()) if token or patterns else "",
+        (*FOXGLOVE, *(allow_origin or [])),
+    )
 
     def started(bound: int) -> None:
         shown = f"[{host}]" if ":" in host else host
-        typer.echo(f"Foxglove connects to ws://{shown}:{bound}")
-        for sentence in meanings(host, patterns):
+        query = f"/?{urlencode({'token': rules.token})}" if rules.token else ""
+        typer.echo(f"Foxglove connects to ws://{shown}:{bound}{query}")
+        for sentence in meanings(host, patterns, has_token=bool(rules.token)):
             typer.echo(sentence, err=True)
 
     log_to_stderr(logging.INFO)
     directory = None if runtime_dir is None else str(runtime_dir)
-    work = run_bridge(directory, host, port, patterns, topics or [], started)
+    work = run_bridge(directory, host, port, patterns, topics or [], rules, started)
     with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
         runner.run(work)
 
 
-def meanings(host: str, patterns: list[str]) -> list[str]:
-    """What the address and the patterns mean for who may see and who may send."""
-    allowed = ", ".join(patterns)
-    if not _is_local(host):
-        may = f"sees all that robots send{', and may command ' + allowed if patterns else ''}"
-        return [f"anybody who reaches {host} {may}: there is no password and no encryption"]
+def meanings(host: str, patterns: list[str], *, has_token: bool) -> list[str]:
+    """What the address, the patterns and the token mean for who may see and who may send."""
+    told = []
     if patterns:
-        return [f"any program of this host may command {allowed}, and so may a page in its browser"]
-    return []
+        told.append(f"who has this address may command {', '.join(patterns)}: keep it to yourself")
+    if not _is_local(host):
+        who = "who has this address" if has_token else "anybody who reaches it (see --token)"
+        told.append(f"{who} sees all that robots send at {host}: there is no encryption")
+    return told
 
 
 def _is_local(host: str) -> bool:

@@ -13,6 +13,7 @@ from sdrlinkd.cli.app import RuntimeDirs, app
 from sdrlinkd.cli.listening import host_and_port
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.config import ENDPOINT, FLEET_NAME, FleetParams
+from sdrlinkd.doors import new_token
 from sdrlinkd.errors import UserError
 from sdrlinkd.extras import needs
 
@@ -51,7 +52,8 @@ def web(
         str, typer.Option(metavar="HOST:PORT", help="Where browsers open the page.")
     ] = "127.0.0.1:8420",
     control: Annotated[
-        bool, typer.Option("--control", help="Let the page change policies of topics.")
+        bool,
+        typer.Option("--control", help="Let the page change policies of topics; asks for a token."),
     ] = False,
     token: Annotated[
         bool, typer.Option("--token", help=f"Ask for a token: that in {TOKEN}, else a new one.")
@@ -72,13 +74,12 @@ def web(
             World,
             follow_daemons,
             follow_fleet,
-            new_token,
             read_floor_plan,
             serve,
         )
     host, port = host_and_port(listen, "--listen", "127.0.0.1:8420")
     options = Options(
-        host, port, (os.environ.get(TOKEN) or new_token()) if token else "", control,
+        host, port, (os.environ.get(TOKEN) or new_token()) if token or control else "", control,
         tls_cert, tls_key, None if floor_plan is None else read_floor_plan(floor_plan),
     )  # fmt: skip
     world = World()

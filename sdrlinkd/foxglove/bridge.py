@@ -12,6 +12,7 @@ from sdrlinkd.client import Message
 from sdrlinkd.daemon_side import DaemonSide
 from sdrlinkd.errors import ungrouped
 from sdrlinkd.foxglove.channels import ReceivedTopics
+from sdrlinkd.foxglove.door import Door, Rules
 from sdrlinkd.foxglove.operators import Operators
 from sdrlinkd.foxglove.report import BridgeReport
 from sdrlinkd.foxglove.scene import Scene
@@ -25,11 +26,9 @@ _log = logging.getLogger(__name__)
 
 
 class Bridge:
-    """One daemon's topics, state and robots on a server at `host`:`port`; port 0: any."""
+    """One daemon's topics, state and robots, for clients that come through the door."""
 
-    def __init__(
-        self, directory: str | None, host: str, port: int, patterns: Sequence[str]
-    ) -> None:
+    def __init__(self, directory: str | None, patterns: Sequence[str], rules: Rules) -> None:
         self._daemon = DaemonSide(directory)
         self._context = context = Context()
         self._topics = ReceivedTopics(context)
@@ -37,10 +36,11 @@ class Bridge:
         self._status = Channel(STATUS, schema=json_schema(Snapshot), context=context)
         self._about = Channel(BRIDGE, schema=json_schema(BridgeReport), context=context)
         self._slow = SlowClients()
-        self._operators = Operators(patterns, self._say, self._daemon.publish, self._topics.again)
-        self._server = start_server(host, port, context, self._operators)
-        self.port = self._server.port
-        """The port that clients connect to."""
+        self._operators = Operators(
+            patterns, rules.secret, self._say, self._daemon.publish, self._topics.again
+        )
+        self._server = start_server(context, self._operators)
+        self.door = Door(rules, self._server.port)
 
     async def run(self, topics: Sequence[str]) -> None:
         """Work until cancelled; `topics` as for a subscriber. Raises UserError."""
@@ -50,6 +50,7 @@ class Bridge:
                 group.create_task(self._daemon.look(self._see))
                 group.create_task(self._operators.send_all(out))
         finally:
+            self.door.close()
             self._daemon.close()
             await asyncio.to_thread(self._server.stop)
             self._slow.close()
@@ -63,6 +64,7 @@ class Bridge:
             not_shown=self._topics.not_shown,
             unreadable=self._scene.unreadable,
             slow=self._slow.count,
+            clients_refused=self.door.refused,
             commands_sent=self._operators.sent,
             commands_refused=self._operators.refused,
             commands_outdated=self._operators.outdated,
@@ -85,13 +87,14 @@ class Bridge:
 
 async def run_bridge(
     directory: str | None, host: str, port: int, patterns: Sequence[str], topics: Sequence[str],
-    started: Callable[[int], None],
+    rules: Rules, started: Callable[[int], None],
 ) -> None:  # fmt: skip
     """Run a bridge until cancelled; `started` is called with the port. Raises UserError.
 
-    `patterns` name what clients may publish, such as `/robot_*/cmd_vel`.
+    `patterns` name what clients may publish, such as `/robot_*/cmd_vel`, if the `rules` have a
+    token. Port 0: any.
     """
-    bridge = Bridge(directory, host, port, patterns)
-    started(bridge.port)
+    bridge = Bridge(directory, patterns, rules)
+    started(await bridge.door.open(host, port))
     with ungrouped():
         await bridge.run(topics)

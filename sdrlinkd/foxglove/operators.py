@@ -11,14 +11,20 @@ from typing import NamedTuple
 
 from foxglove.websocket import ChannelView, Client, ClientChannel, ServerListener
 
-from sdrlinkd.adapters import cdr_from_fields
+from sdrlinkd.adapters import cdr_from_fields, check_cdr
 from sdrlinkd.client import AsyncPublisher, MessageRefusedError, NoDaemonError, RefusedError
 from sdrlinkd.errors import UserError
 from sdrlinkd.foxglove.commands import Command, judge
+from sdrlinkd.foxglove.door import CHANNEL
 from sdrlinkd.reports import Snapshot
 
 MOST_ADVERTISED = 1000
 """Most topics that all clients together may announce."""
+MOST_BYTES = 1 << 16
+"""Largest command in octets."""
+MOST_BRACKETS = 4096
+"""Most brackets of a command in JSON."""
+NOT_ADMITTED = "publish: commands need the address with the token that the bridge printed"
 QUIET_S = 2.0
 """For so long in s, the same sentence is not said again."""
 MOST_SAID = 1000
@@ -45,10 +51,13 @@ class Operators(ServerListener):
     """
 
     def __init__(
-        self, patterns: Sequence[str], say: Callable[[str, str], None],
+        self, patterns: Sequence[str], secret: str, say: Callable[[str, str], None],
         publish: Publish, subscribed: Callable[[str, int, float], None],
     ) -> None:  # fmt: skip
         self._patterns = list(patterns)
+        self._secret = secret
+        self._admitted: set[int] = set()
+        """Clients that came through the door with its token."""
         self._subscribed = subscribed
         self._say = say
         self._publish = publish
@@ -76,7 +85,12 @@ class Operators(ServerListener):
 
     def on_client_advertise(self, client: Client, channel: ClientChannel) -> None:
         """Note what a client is going to publish, and say at once if that is refused."""
+        if channel.topic == self._secret:
+            self._admitted.add(client.id)
+            return
         told = judge(channel.topic, channel.schema_name, channel.encoding, self._patterns)
+        if client.id not in self._admitted:
+            told = NOT_ADMITTED
         if len(self._advertised) >= MOST_ADVERTISED:
             told = f"publish: got one topic more; allowed: {MOST_ADVERTISED}"
         else:
@@ -87,6 +101,8 @@ class Operators(ServerListener):
     def on_client_unadvertise(self, client: Client, client_channel_id: int) -> None:
         """Forget what a client no longer publishes."""
         self._advertised.pop((client.id, client_channel_id), None)
+        if client_channel_id == CHANNEL:
+            self._admitted.discard(client.id)
 
     def on_message_data(self, client: Client, client_channel_id: int, data: bytes) -> None:
         """Take a message of a client; an older one of its topic that still waits is dropped."""
@@ -95,6 +111,11 @@ class Operators(ServerListener):
             if not isinstance(command, Command):
                 # Why was said when the client announced the topic.
                 self.refused += 1
+                return
+            if len(data) > MOST_BYTES:
+                self.refused += 1
+                sentence = f"{command.name}: got {len(data)} bytes; allowed: {MOST_BYTES}"
+                self._soon(self._refuse, command.name, sentence)
                 return
             self.outdated += command.name in self._waiting
             self._waiting[command.name] = _Waiting(command, data, time.time_ns())
@@ -123,7 +144,7 @@ class Operators(ServerListener):
     async def _send(self, waiting: _Waiting, out: AsyncPublisher) -> None:
         command = waiting.command
         try:
-            name, cdr = self._bus_name(command), _cdr(command, waiting.data)
+            name, cdr = self._bus_name(command), cdr_of(command, waiting.data)
             await self._publish(
                 out, name, cdr, command.type, qos="urgent", dst=command.robot,
                 published_ns=waiting.came_ns, timeout_s=MOST_WAIT_S,
@@ -161,12 +182,23 @@ class Operators(ServerListener):
         self._say(topic, sentence)
 
 
-def _cdr(command: Command, data: bytes) -> bytes:
+def cdr_of(command: Command, data: bytes) -> bytes:
     """The message of a client as CDR. Raises UserError."""
-    if command.encoding == "cdr":
-        return data
+    cdr = data if command.encoding == "cdr" else _cdr_of_json(command, data)
+    check_cdr(command.type, cdr, command.name)
+    return cdr
+
+
+def _cdr_of_json(command: Command, data: bytes) -> bytes:
+    # A string may hold brackets, but no command has so many.
+    if data.count(b"[") + data.count(b"{") > MOST_BRACKETS:
+        raise UserError(f"got more than {MOST_BRACKETS} brackets; allowed: a message's fields")
     try:
-        fields = json.loads(data)
-    except ValueError as error:
+        fields = json.loads(data, parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
         raise UserError(f"no JSON: {error}") from None
     return cdr_from_fields(command.type, fields, command.name)
+
+
+def _no_number(text: str) -> object:
+    raise UserError(f"got {text}; allowed: finite numbers")

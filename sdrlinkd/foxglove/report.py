@@ -19,6 +19,8 @@ class BridgeReport(msgspec.Struct, frozen=True, kw_only=True):
     slow: int
     """How often clients were found too slow, and lost their oldest messages; at most twice a minute
     is told."""
+    clients_refused: int
+    """Connections that were refused: without the token, from other pages or other accounts."""
     commands_sent: int
     """Commands from Foxglove that the daemon took."""
     commands_refused: int

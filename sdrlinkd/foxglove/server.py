@@ -38,15 +38,13 @@ class SlowClients(logging.Handler):
         super().close()
 
 
-def start_server(
-    host: str, port: int, context: Context, listener: ServerListener
-) -> WebSocketServer:
-    """Listen for clients at `host`:`port`; port 0: any. Raises UserError."""
+def start_server(context: Context, listener: ServerListener) -> WebSocketServer:
+    """Listen for the door on this host, at any port. Raises UserError."""
     try:
         return foxglove.start_server(
             name="sdrlink",
-            host=host,
-            port=port,
+            host="127.0.0.1",
+            port=0,
             capabilities=[Capability.ClientPublish],
             server_listener=listener,
             supported_encodings=list(ENCODINGS),
@@ -55,4 +53,4 @@ def start_server(
         )
     except RuntimeError as error:
         reason = str(error).rpartition("Failed to bind port: ")[2]
-        raise UserError(f"--listen {host}:{port}: {reason}") from None
+        raise UserError(f"Foxglove's server: {reason}") from None

@@ -4,16 +4,20 @@ from types import ModuleType
 
 from sdrlinkd.foxglove import channels
 from sdrlinkd.foxglove.channels import ReceivedTopics
-from sdrlinkd.foxglove.operators import Operators
+from sdrlinkd.foxglove.door import CHANNEL, Door
+from sdrlinkd.foxglove.operators import Operators, cdr_of
 from sdrlinkd.foxglove.scene import Scene
 from sdrlinkd.foxglove.server import SlowClients, start_server
 
 __all__ = [
+    "CHANNEL",
     "CONSTANTS",
+    "Door",
     "Operators",
     "ReceivedTopics",
     "Scene",
     "SlowClients",
+    "cdr_of",
     "start_server",
 ]
 

@@ -7,7 +7,6 @@ changes nothing but policies, and these only where that is allowed. Needs the ex
 from sdrlinkd.web.fleet_feed import follow_fleet
 from sdrlinkd.web.floor_plan import FloorPlan, read_floor_plan
 from sdrlinkd.web.following import follow_daemons
-from sdrlinkd.web.guard import new_token
 from sdrlinkd.web.server import Options, serve
 from sdrlinkd.web.world import World
 
@@ -17,7 +16,6 @@ __all__ = [
     "World",
     "follow_daemons",
     "follow_fleet",
-    "new_token",
     "read_floor_plan",
     "serve",
 ]

@@ -13,17 +13,13 @@ import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
 
+from sdrlinkd.doors import LOCAL_NAMES
 from sdrlinkd.errors import UserError, ungrouped
 from sdrlinkd.web.floor_plan import FloorPlan
-from sdrlinkd.web.guard import LOCAL_NAMES, Guard
+from sdrlinkd.web.guard import Guard
 from sdrlinkd.web.page import build_page
 from sdrlinkd.web.viewer import Viewer
 from sdrlinkd.web.world import World, each_second
-
-NO_CONTROL_ABROAD = (
-    "--control beyond this host needs a token, so that not everybody on the network can change "
-    "policies: add --token"
-)
 
 
 @dataclass(frozen=True)
@@ -44,9 +40,7 @@ class Options:
         return self.host in LOCAL_NAMES
 
     def check(self) -> None:
-        """Raises UserError for what would let strangers in, and for files that cannot be used."""
-        if self.may_control and not self.is_local and not self.token:
-            raise UserError(NO_CONTROL_ABROAD)
+        """Raises UserError for files that cannot be used."""
         if (self.certificate is None) != (self.key is None):
             raise UserError("--tls-cert and --tls-key: got one of them; allowed: both, or none")
         if self.certificate is not None and self.key is not None:

@@ -1,6 +1,7 @@
 """What the air may do to the bridge, and a client that reads too slowly; without daemons."""
 
 import asyncio
+import contextlib
 import json
 import resource
 import socket
@@ -8,24 +9,33 @@ import struct
 import time
 from contextlib import closing
 
+import numpy as np
 import pytest
 from foxglove import Context
 from foxglove.websocket import ServerListener
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sdrlinkd.client import Message
 from sdrlinkd.errors import UserError
+from sdrlinkd.foxglove import Command, Rules
 from sdrlinkd.foxglove.testing import (
+    CHANNEL,
     CONSTANTS,
+    Door,
     Operators,
     ReceivedTopics,
     Scene,
     SlowClients,
+    cdr_of,
     start_server,
 )
 from tests.cli.snapshots import SNAPSHOT
 from tests.foxglove.viewer import SUBPROTOCOL, Viewer
+from tests.laws import law
 
 CDR = b"\0\1\0\0"
+SECRET = "/secret"
 HOSTILE = (
     ("/x\0\n\"}],{", "a/msg/B"),
     ("/rx_robot_1/\u202eevil<script>", "'; drop"),
@@ -65,7 +75,7 @@ def subscriptions():
 @pytest.fixture
 def url(context, subscriptions):
     """The address of a server."""
-    started = start_server("127.0.0.1", 0, context, subscriptions)
+    started = start_server(context, subscriptions)
     yield f"ws://127.0.0.1:{started.port}"
     started.stop()
 
@@ -201,8 +211,10 @@ async def test_of_a_flood_of_commands_the_newest_counts():
     async def publish(_, name, cdr, *__, **___):
         sent.append((name, cdr))
 
-    taker = Operators(patterns, lambda *each: said.append(each), publish, print)
+    taker = Operators(patterns, SECRET, lambda *each: said.append(each), publish, print)
     client = type("Client", (), {"id": 1})
+    door = {"id": CHANNEL, "topic": SECRET, "schema_name": "", "encoding": "json"}
+    taker.on_client_advertise(client, type("Channel", (), door))
     for number, topic in enumerate(("/robot_2/cmd_vel", "/robot_2/led", "/robot_3/cmd_vel")):
         shape = {"id": number, "topic": topic, "schema_name": "a/B", "encoding": "cdr"}
         taker.on_client_advertise(client, type("Channel", (), shape))
@@ -222,7 +234,33 @@ async def test_of_a_flood_of_commands_the_newest_counts():
     assert (taker.outdated, taker.refused, len(said)) == (99, 2, 1)
 
 
-def test_an_address_that_is_taken_or_wrong_is_one_sentence(context, url):
+async def test_an_address_that_is_taken_or_wrong_is_one_sentence(url):
     port = _address(url)[1]
-    with pytest.raises(UserError, match=f"--listen 127.0.0.1:{port}: Address already in use"):
-        start_server("127.0.0.1", port, context, Subscriptions())
+    with pytest.raises(UserError, match=f"--listen 127.0.0.1:{port}: .*address already in use"):
+        await Door(Rules(is_local=True), port).open("127.0.0.1", port)
+
+
+@law(200)
+@given(
+    st.binary(max_size=300)
+    | st.recursive(
+        st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+        lambda each: st.lists(each, max_size=3) | st.dictionaries(st.text(max_size=8), each),
+    ).map(lambda each: json.dumps({"linear": each}).encode())
+    | st.sampled_from([b"[" * 200_000, b'{"a":' * 60_000, b'{"linear": {"x": 1e999}}'])
+)
+def test_any_command_is_a_message_or_refused_in_a_sentence(data):
+    for encoding in ("cdr", "json"):
+        command = Command(2, "/cmd_vel", "geometry_msgs/msg/Twist", encoding)
+        with contextlib.suppress(UserError):
+            assert np.isfinite(np.frombuffer(cdr_of(command, data)[4:52], "<f8")).all()
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999", "-1e999"])
+def test_numbers_that_are_not_finite_are_refused(number):
+    command = Command(2, "/cmd_vel", "geometry_msgs/msg/Twist", "json")
+    with pytest.raises(UserError, match="allowed: finite numbers"):
+        cdr_of(command, f'{{"linear": {{"x": {number}}}}}'.encode())
+    twist = CDR + struct.pack("<6d", *5 * [0.0], float(number))
+    with pytest.raises(UserError, match="allowed: finite numbers"):
+        cdr_of(command._replace(encoding="cdr"), twist)

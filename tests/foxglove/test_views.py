@@ -120,9 +120,12 @@ def test_a_missing_sdk_and_a_bad_address_are_one_sentence(monkeypatch, capsys):
 
 
 def test_the_command_says_who_may_see_and_send():
-    assert meanings("127.0.0.1", []) == meanings("::1", []) == meanings("localhost", []) == []
-    assert "a page in its browser" in meanings("127.0.0.1", ["/robot_2/*"])[0]
-    (open_,) = meanings("0.0.0.0", [])
-    assert open_.startswith("anybody who reaches 0.0.0.0 sees all that robots send: there is no")
-    (both,) = meanings("192.0.2.1", ["/robot_2/*"])
-    assert "sees all that robots send, and may command /robot_2/*: there" in both
+    for host in ("127.0.0.1", "::1", "localhost"):
+        assert meanings(host, [], has_token=False) == meanings(host, [], has_token=True) == []
+    (command,) = meanings("127.0.0.1", ["/robot_2/*"], has_token=True)
+    assert command == "who has this address may command /robot_2/*: keep it to yourself"
+    (open_,) = meanings("0.0.0.0", [], has_token=False)
+    assert open_.startswith("anybody who reaches it (see --token) sees all that robots send")
+    both = meanings("192.0.2.1", ["/robot_2/*"], has_token=True)
+    assert both[0] == command
+    assert both[1].startswith("who has this address sees all that robots send at 192.0.2.1: there")

@@ -78,6 +78,11 @@ def test_with_a_token_nobody_else_comes_in(tmp_path):
         assert not joins(url, Origin=own)
         status, _, headers = get(url, "/?token=opensesame")
         assert (status, headers["location"]) == (303, "/")
+        assert "frame-ancestors 'none'" in headers["content-security-policy"]
+        for path in ("//evil.example/x", "/\\evil.example/x", "///evil.example"):
+            status, _, headers = get(url, f"{path}?token=opensesame")
+            assert (status, headers["location"].lstrip("/")[:4]) == (303, "evil")
+            assert not headers["location"].startswith(("//", "/\\"))
         cookie = headers["set-cookie"]
         assert "HttpOnly" in cookie
         assert "SameSite=strict" in cookie
@@ -86,6 +91,13 @@ def test_with_a_token_nobody_else_comes_in(tmp_path):
         assert joins(url, Cookie=ours, Origin=own)
         assert not joins(url, Cookie=ours, Origin="http://evil.example")
         assert get(url, Cookie="sdrlink_token=x; ;;=")[0] == 403
+
+
+def test_whoever_may_control_needs_the_token(tmp_path):
+    with served("--listen", "127.0.0.1:0", "--control", folder=tmp_path) as (url, _):
+        assert len(url.query) > 20
+        assert get(url)[0] == 403
+        assert get(url, f"/?{url.query}")[0] == 303
 
 
 def test_a_token_may_contain_anything(tmp_path):
@@ -106,7 +118,6 @@ def test_behind_a_proxy_its_name_counts(tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--listen", "0.0.0.0:0", "--control"), "--control beyond this host needs a token"),
         (("--listen", "nowhere"), "--listen: got"),
         (("--listen", "127.0.0.1:1", "--tls-cert", "a.pem"), "got one of them"),
         (("--tls-cert", "a", "--tls-key", "b"), "--tls-cert a: No such"),
