@@ -86,13 +86,13 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Registry names to take from the bus; empty: all."""
     rx_format: str = "/rx_robot_{src_id}"
     """Namespace under which another robot's topics are republished."""
-    rx_depth: Annotated[int, Meta(ge=0)] = 256
+    rx_depth: Annotated[int, Meta(ge=0, le=1_000_000)] = 256
     """Messages kept for a consumer that does not read; 0: no limit."""
     backend: BackendName = "direct"
     """What carries the PDUs: a radio, a simulation, a flowgraph, or `direct`, without a modem."""
     drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0
     """Time in s for sending the queue when the daemon is stopped."""
-    seed: int | None = None
+    seed: Annotated[int, Meta(ge=0, le=(1 << 63) - 1)] | None = None
     """Seed of all random numbers; absent: from the operating system."""
     link: LinkParams = LinkParams()
     queue: QueueParams = QueueParams()

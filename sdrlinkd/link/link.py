@@ -419,6 +419,14 @@ class Link:
         """The topics that other robots declared, by source."""
         return self._heard_topics.declared()
 
+    def heard_topics_of(self, src: int) -> list[HeardTopic]:
+        """The topics that a robot declared."""
+        return self._heard_topics.declared_by(src)
+
+    def heard_versions(self) -> dict[int, int]:
+        """By source, what `heard_version` was when what it declares changed last."""
+        return self._heard_topics.versions()
+
     def take_changed_topics(self) -> list[tuple[int, int]]:
         """(source, number) of topics whose numbers have another meaning since the last call."""
         return self._heard_topics.take_changed()

@@ -13,7 +13,7 @@ class QueueParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     max_messages: Annotated[int, Meta(ge=1, le=1_000_000)] = 10_000
     """Most messages that may wait."""
-    max_bytes: Annotated[int, Meta(ge=1)] = 16 << 20
+    max_bytes: Annotated[int, Meta(ge=1, le=1 << 40)] = 16 << 20
     """Most bytes of payload that may wait."""
     max_airtime_s: Annotated[float, Meta(gt=0)] = float("inf")
     """Limit as airtime in s: the bytes that the channel carries in this time."""
@@ -25,9 +25,9 @@ class ReassemblyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     timeout_s: Annotated[float, Meta(gt=0, le=60)] = 0.5
     """Time in s without a new fragment after which a message is given up; the same at all nodes. A
     topic can send 256 fragmented messages in 1.25 times this."""
-    source_bytes: Annotated[int, Meta(ge=1 << 16)] = 12 << 20
+    source_bytes: Annotated[int, Meta(ge=1 << 16, le=1 << 40)] = 12 << 20
     """Memory for incomplete messages of one robot."""
-    total_bytes: Annotated[int, Meta(ge=1 << 16)] = 48 << 20
+    total_bytes: Annotated[int, Meta(ge=1 << 16, le=1 << 40)] = 48 << 20
     """Memory for incomplete messages of all robots together."""
 
 

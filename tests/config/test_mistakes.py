@@ -4,14 +4,41 @@ import re
 from pathlib import Path
 
 import pytest
+from msgspec import inspect
 
 from sdrlinkd.__main__ import main
+from sdrlinkd.config.schema import Config
 
 ETC = Path(__file__).parents[2] / "etc"
 
 LOOPBACK = 'backend = "loopback"\n'
 SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=uhd"\n'
 ON_AIR = "[modem]\nfrequency_hz = 4e8\n"
+
+
+def test_every_whole_number_has_a_largest_and_a_smallest_value():
+    """Beyond them, it is said so; no number of the system's is the limit."""
+    seen, found = set(), []
+
+    def walk(kind, name):
+        if isinstance(kind, inspect.StructType):
+            if kind.cls not in seen:
+                seen.add(kind.cls)
+                for each in kind.fields:
+                    walk(each.type, f"{kind.cls.__name__}.{each.name}")
+        elif isinstance(kind, inspect.IntType):
+            found.append(name)
+            assert None not in (kind.ge, kind.le), name
+        else:
+            for part in ("types", "type", "item_type", "key_type", "value_type", "item_types"):
+                inner = getattr(kind, part, ())
+                for each in inner if isinstance(inner, tuple) else (inner,):
+                    if isinstance(each, inspect.Type):
+                        walk(each, name)
+
+    walk(inspect.type_info(Config), "")
+    assert {"Config.seed", "Config.rx_depth", "TopicSettings.depth"} <= set(found)
+
 
 # Content of the file, the cited line (0: none), and the message.
 MISTAKES = [
@@ -32,6 +59,7 @@ MISTAKES = [
     ('topics = "odom"', 1, ['topics: got "odom"', "a list"]),
     ("[topic.odo]\ndepth = 1", 1, ['topic."odo": unknown topic', "did you mean odom"]),
     ('[topic.odom]\n[topic."/odom"]', 2, ["listed twice"]),
+    ("[topic.odom]\ndepth = 9223372036854775807", 2, ["got 9223372036854775807", "to 1000000"]),
     ("[topic.odom]\nprio = 3", 2, ["topic.odom.prio: unknown key; did you mean priority"]),
     ('[topic.odom]\nlifespan_s = "0.3 parsec"', 2, ["topic.odom.lifespan_s", '"300 ms"']),
     ('[topic.odom]\nlifespan_s = "soon"', 2, ['got "soon"', "with a unit"]),

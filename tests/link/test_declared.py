@@ -9,7 +9,11 @@ from hypothesis import strategies as st
 from sdrlinkd.errors import DeclarationError
 from sdrlinkd.link import Offer, Outcome, Overrides, PolicyTable, RelayParams, TopicPolicy
 from sdrlinkd.link.topics import (
+    FREE,
     MOST_KEYS,
+    MOST_OF_ALL,
+    MOST_OF_ONE,
+    MOST_TOLD,
     N_NUMBERS,
     TELLING_SHARE,
     HeardTopics,
@@ -529,3 +533,65 @@ def test_a_topic_of_a_robot_elsewhere_is_taken_only_from_both(allowed, n):
         gateway.submit(topic.id, CDR + bytes(48), 0.05 * i)
     assert len(run([gateway, receiver], 0.0, 20)) == n
     assert receiver.audit() == []
+
+
+def declares(topics, src, number, name, kind="a/msg/B"):
+    """A robot declares a topic under a number, in as many pieces as it takes."""
+    for piece in pieces(number, Description(name, kind), 60):
+        known = topics.take(src, piece)
+    return known
+
+
+def test_declared_topics_are_bounded_by_robot_and_in_all_and_each_robot_has_some():
+    topics = HeardTopics(Registry(()), True, lambda _: bytes(8))
+    for src in range(1, 254):
+        for number in range(16, 256):
+            declares(topics, src, number, f"topic_{number}")
+    sizes = {src: len(known) for src, known in topics.declared().items()}
+    assert sizes[1] == MOST_OF_ONE
+    assert min(sizes.values()) == FREE
+    assert sum(sizes.values()) <= MOST_OF_ALL + 253 * FREE
+    refused = topics.refused[253][200]
+    assert refused == f"topic_200: got one more; allowed: {MOST_OF_ALL} of all robots together"
+    assert topics.refused[1][255].endswith(f"allowed: {MOST_OF_ONE} of a robot")
+    assert len(topics.notices()) == MOST_TOLD + 1
+    assert topics.notices()[-1] == f"and {253 - MOST_TOLD} more like the last"
+    # Who restarts makes room, also for those that were refused.
+    topics.forget(1)
+    assert declares(topics, 253, 200, "topic_200")
+    assert len(topics.refused[253]) == 240 - FREE - 1
+
+
+@law(300)
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(1, 2), st.integers(16, 20), st.sampled_from(["a", "b", "B", "c"]),
+            st.sampled_from(["x/msg/X", "y/msg/Y"]),
+        )
+        | st.integers(1, 2)
+    )
+)  # fmt: skip
+def test_whatever_is_declared_each_name_has_one_number_and_one_type(steps):
+    topics, heard = HeardTopics(Registry(()), True, lambda _: bytes(8)), {}
+    for step in steps:
+        if isinstance(step, int):
+            topics.forget(step)
+            continue
+        before = topics.versions()
+        src, number, name, kind = step
+        if declares(topics, src, number, name, kind):
+            assert topics.topic(src, number)[1:3] == (name, kind)
+            assert topics.versions()[src] > before.get(src, 0)
+        for each, known in topics.declared().items():
+            names = [topic.name for topic in known]
+            assert len({name.lower() for name in names}) == len(names)
+            for topic in known:
+                assert topics.topic(each, topic.base) == topic
+            numbers = [topics.topic(each, number) for number in range(16, 21)]
+            assert {topic for topic in numbers if topic is not None} >= set(known)
+            assert {topic.name for topic in numbers if topic is not None} == set(names)
+            # What did not change has the version it had.
+            if heard.get(each, (0, None))[0] == topics.versions()[each]:
+                assert heard[each][1] == known
+            heard[each] = topics.versions()[each], known

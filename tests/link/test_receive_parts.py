@@ -23,6 +23,7 @@ from sdrlinkd.link.receive import (
     can_be_true,
 )
 from sdrlinkd.link.receive.testing import (
+    MOST_TALLIES,
     Acceptance,
     AirHeard,
     Completion,
@@ -934,3 +935,24 @@ def test_the_first_told_number_renumbers_what_was_heard_before():
     assert made.heard(11, 11, 1.0)
     assert (made.number, made.fills, made.lost) == (779, True, 0)
     assert not made.heard(12, 12, 1.0)
+
+
+def test_topics_beyond_the_most_that_are_counted_share_a_tally_of_their_robot():
+    """The ledger still adds up, and the report has an end."""
+    ledger = RxLedger(HeardTopics(TOPICS, True, lambda _: bytes(8)))
+    n = 0
+    for src in range(1, 251):
+        for topic_id in range(16, 256):
+            ledger.tally(src, topic_id).drop("rx_unknown_topic")
+            n += 1
+    told = ledger.report_topics()
+    assert len(told) <= MOST_TALLIES + 250
+    assert sum(each.dropped["rx_unknown_topic"] for each in told) == n
+    assert ledger.report(Held(n, 0, 0)).dropped == {"rx_unknown_topic": n}
+    assert ledger.audit(Held(n, 0, 0)) == []
+    shared = [each for each in told if each.name == "(further topics)"]
+    assert [each.src for each in shared] == list(range(5, 251))
+    known = next(topic.id for topic in TOPICS.topics)
+    ledger.tally(250, known).deliver(7)
+    (own,) = [each for each in ledger.report_topics() if each.delivered]
+    assert (own.src, own.topic_id) == (250, known)

@@ -12,7 +12,8 @@ from sdrlinkd.link.qos import MAX_PRIORITY, MIDDLE_PRIORITY
 MOST_LATCHED = 64
 """Most messages that `keep_all` keeps for late joiners."""
 Positive = Annotated[float, Meta(gt=0)]
-Amount = Annotated[int, Meta(ge=0)]
+Amount = Annotated[int, Meta(ge=0, le=1_000_000)]
+Octets = Annotated[int, Meta(ge=0, le=1 << 40)]
 
 
 class TopicPolicy(
@@ -71,18 +72,18 @@ class TopicPolicy(
     reserve: bool = False
     """Whether to reserve the team's air for a message of `max_bytes` every `period_s`, which are
     both needed. While the team has no air for it, the topic's messages are dropped."""
-    decimate: Annotated[int, Meta(ge=1)] = 1
+    decimate: Annotated[int, Meta(ge=1, le=1_000_000)] = 1
     """Send one message in this many."""
     on_change: bool = False
     """Whether to send only messages that differ from the last one."""
-    max_bytes: Amount = 0
+    max_bytes: Octets = 0
     """Size in bytes above which messages are refused, sent or heard; 0: no limit but the link's."""
     compress: Literal["none", "zstd"] = "none"
     """Compression; a message that zstd does not shrink is sent uncompressed."""
     dictionary: str = ""
     """File with a zstd dictionary for small messages, relative to the configuration; the same at
     all robots."""
-    queue_bytes: Amount = 0
+    queue_bytes: Octets = 0
     """Most bytes that wait in the queue, beyond which the oldest messages are dropped; 0: no limit
     but the queue's."""
     queue_s: Annotated[float, Meta(ge=0)] = 0.0

@@ -9,6 +9,13 @@ from sdrlinkd.link.topics import HeardTopics
 from sdrlinkd.reports import ReceivedTopicReport, RxReport
 from sdrlinkd.wire import PARTS
 
+MOST_TALLIES = 1024
+"""Most topics that are counted one by one, and twice as many if they are known; those of a robot
+that come later share a tally."""
+OTHERS = -1
+"""In place of their topic ids."""
+_UNKNOWN = {PARTS: "(parts)", OTHERS: "(further topics)"}
+
 
 class Held(NamedTuple):
     """Messages begun since the start, and those that are still incomplete."""
@@ -64,6 +71,11 @@ class RxLedger:
     def tally(self, src: int, topic_id: int) -> RxTally:
         """The message counters of one topic from one source."""
         tally = self._tallies.get((src, topic_id))
+        if tally is None and len(self._tallies) >= MOST_TALLIES:
+            # Numbers that mean nothing must leave room for topics.
+            n, is_known = len(self._tallies), self._topics.topic(src, topic_id) is not None
+            topic_id = topic_id if is_known and n < 2 * MOST_TALLIES else OTHERS
+            tally = self._tallies.get((src, topic_id))
         if tally is None:
             tally = self._tallies[src, topic_id] = RxTally()
         return tally
@@ -86,8 +98,8 @@ class RxLedger:
         """Reports on each topic of each source, without rates, ages and bus names."""
         reports = []
         for (src, topic_id), tally in sorted(self._tallies.items()):
-            topic = self._topics.topic(src, topic_id)
-            unknown = "(parts)" if topic_id == PARTS else f"(topic id {topic_id})"
+            topic = None if topic_id == OTHERS else self._topics.topic(src, topic_id)
+            unknown = _UNKNOWN.get(topic_id, f"(topic id {topic_id})")
             ended = tally.delivered + sum(tally.dropped.values())
             reports.append(
                 ReceivedTopicReport(

@@ -10,10 +10,11 @@ from sdrlinkd.link.receive.heard_records import HeardRecords
 from sdrlinkd.link.receive.pdu_read import PduRead, PduReader
 from sdrlinkd.link.receive.recorded import OwnPdus, RecentCommands
 from sdrlinkd.link.receive.repeated import Repeated, RepeatedPdus
-from sdrlinkd.link.receive.rx_ledger import Held, RxLedger
+from sdrlinkd.link.receive.rx_ledger import MOST_TALLIES, Held, RxLedger
 from sdrlinkd.link.receive.undeclared import UndeclaredMessages, Whole
 
 __all__ = [
+    "MOST_TALLIES",
     "Acceptance",
     "AirHeard",
     "Completion",

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire import (
     FIRST_NUMBER,
+    MAX_NAME,
     Description,
     Registry,
     TopicPiece,
@@ -15,7 +16,14 @@ from sdrlinkd.wire import (
 )
 
 MOST_TOLD = 3
-"""Most refused declarations of a robot that a notice names."""
+"""Most refused declarations of a robot that a notice names, and most robots of a notice."""
+FREE = 4
+"""So many of a robot's topics are taken even if others declare too many."""
+MOST_OF_ONE, MOST_OF_ALL = 128, 1024
+"""Most declared topics of a robot, and of all together beyond these: each costs memory and time for
+ever."""
+MOST_OCTETS = 2 * MAX_NAME + 16
+"""Longest description in octets."""
 
 
 class HeardTopic(NamedTuple):
@@ -40,9 +48,15 @@ class HeardTopic(NamedTuple):
 @dataclass(slots=True)
 class _Source:
     known: dict[int, HeardTopic] = field(default_factory=dict)
+    numbers: dict[str, list[int]] = field(default_factory=dict)
+    """Numbers of each name, the one under which it is counted first."""
+    folded: dict[str, str] = field(default_factory=dict)
+    """Names by their lower case."""
     checks: dict[int, int] = field(default_factory=dict)
     pieces: dict[int, dict[int, bytes]] = field(default_factory=dict)
     """Pieces of the description that a number's check belongs to."""
+    version: int = 0
+    """That of all topics at the last change of this robot's."""
 
 
 class HeardTopics:
@@ -60,6 +74,8 @@ class HeardTopics:
         self._not_understood: set[int] = set()
         self._own_hash = own_hash
         self._sources: dict[int, _Source] = {}
+        self._n_beyond = 0
+        """Declared topics of all robots, without the FREE ones of each."""
         self.version = 0
         """Counts the changes of what is known."""
         self.changed: list[tuple[int, int]] = []
@@ -106,25 +122,32 @@ class HeardTopics:
             return False
         there = source.pieces[number]
         there[at] = data
+        if sum(map(len, there.values())) > MOST_OCTETS:
+            there.clear()
+            return False
         if any(i not in there for i in range(n)):
             return False
         try:
             about = parse_description(b"".join(there[i] for i in range(n)), check)
-            _check(source, about)
+            self._check(source, about)
         except PduError as error:
             self.refused.setdefault(src, {})[number] = error.detail
             return False
         finally:
             there.clear()
-        for other, topic in list(source.known.items()):
-            if topic.name == about.name and _kind(topic.about) != _kind(about):
+        for other in source.numbers.get(about.name, [])[:]:
+            if _kind(source.known[other].about) != _kind(about):
                 # Its newest word counts: the producer has begun anew with another type.
                 self._forget_number(src, source, other)
-        same = (topic.base for topic in source.known.values() if topic.name == about.name)
-        base = next(same, number)
+        if about.name not in source.numbers:
+            self._n_beyond += len(source.numbers) >= FREE
+            source.numbers[about.name] = []
+        numbers = source.numbers[about.name]
+        numbers.append(number)
+        source.folded[about.name.lower()] = about.name
         self.refused.get(src, {}).pop(number, None)
-        source.known[number] = HeardTopic(base, about.name, about.type, about)
-        self.version += 1
+        source.known[number] = HeardTopic(numbers[0], about.name, about.type, about)
+        self._changes(source)
         return True
 
     def forget(self, src: int) -> None:
@@ -134,6 +157,7 @@ class HeardTopics:
         self._not_understood.discard(src)
         if source is not None:
             self.version += 1
+            self._n_beyond -= max(0, len(source.numbers) - FREE)
             self.changed += [(src, number) for number in source.known]
 
     def take_changed(self) -> list[tuple[int, int]]:
@@ -143,44 +167,80 @@ class HeardTopics:
 
     def declared(self) -> dict[int, list[HeardTopic]]:
         """The declared topics by source, each name once."""
-        return {
-            src: list({topic.name: topic for topic in source.known.values()}.values())
-            for src, source in self._sources.items()
-        }
+        return {src: self.declared_by(src) for src in self._sources}
+
+    def declared_by(self, src: int) -> list[HeardTopic]:
+        """The declared topics of a source, each name once."""
+        source = self._sources[src]
+        return [source.known[numbers[0]] for numbers in source.numbers.values()]
+
+    def versions(self) -> dict[int, int]:
+        """The version at which what each source declared changed last."""
+        return {src: source.version for src, source in self._sources.items()}
 
     def notices(self) -> list[str]:
         """What a person should know about others' declarations, in sentences."""
-        notices = [
+        beyond = [
             f"robot {src} declares topics beyond the registry, which this robot takes only with "
             "`auto = true`"
             for src in sorted(self._not_understood)
         ]
-        notices += [
+        refused = [
             f"robot {src} declares topics that cannot be used ({len(refused)}): "
             f"{'; '.join(list(refused.values())[:MOST_TOLD])}"
             for src, refused in sorted(self.refused.items())
             if refused
         ]
-        for src, topics in sorted(self.declared().items()):
-            notices += [
-                f"robot {src} sends {topic.name} as {topic.type} with hash {_hash(topic)}, but "
-                f"here it is {self._ours(topic)}; its messages are dropped (rx_other_type): use "
-                "the same type, from the same version of its package"
-                for topic in topics
-                if self.differs(topic)
-            ]
-        return notices
+        differing = [
+            f"robot {src} sends {topic.name} as {topic.type} with hash {_hash(topic)}, but "
+            f"here it is {self._ours(topic)}; its messages are dropped (rx_other_type): use "
+            "the same type, from the same version of its package"
+            for src in sorted(self._sources)
+            for topic in self.declared_by(src)
+            if self.differs(topic)
+        ]
+        return [*_some(beyond), *_some(refused), *_some(differing)]
+
+    def _check(self, source: _Source, about: Description) -> None:
+        """Raise PduError if a source cannot have one more topic, or not one of that name."""
+        if about.name in source.numbers:
+            return
+        other = source.folded.get(about.name.lower(), about.name)
+        if other != about.name:
+            raise PduError(
+                "rx_control_bad", f"{about.name} differs from {other} by upper and lower case only"
+            )
+        n = len(source.numbers)
+        if n >= MOST_OF_ONE:
+            raise PduError(
+                "rx_control_bad", f"{about.name}: got one more; allowed: {MOST_OF_ONE} of a robot"
+            )
+        if n >= FREE and self._n_beyond >= MOST_OF_ALL:
+            raise PduError(
+                "rx_control_bad",
+                f"{about.name}: got one more; allowed: {MOST_OF_ALL} of all robots together",
+            )
+
+    def _changes(self, source: _Source) -> None:
+        self.version += 1
+        source.version = self.version
 
     def _forget_number(self, src: int, source: _Source, number: int) -> None:
         """Forget what a number meant; other numbers of its name are counted under one of them."""
-        if source.known.pop(number, None) is None:
+        topic = source.known.pop(number, None)
+        if topic is None:
             return
-        self.version += 1
+        self._changes(source)
         self.changed.append((src, number))
-        left = [other for other, topic in source.known.items() if topic.base == number]
-        for other in left:
-            source.known[other] = source.known[other]._replace(base=left[0])
-            self.changed.append((src, other))
+        left = source.numbers[topic.name]
+        left.remove(number)
+        if not left:
+            del source.numbers[topic.name], source.folded[topic.name.lower()]
+            self._n_beyond -= len(source.numbers) >= FREE
+        elif topic.base == number:
+            for other in left:
+                source.known[other] = source.known[other]._replace(base=left[0])
+                self.changed.append((src, other))
 
     def _ours(self, topic: HeardTopic) -> str:
         registered = self._registry.by_name(topic.at_origin)
@@ -188,14 +248,10 @@ class HeardTopics:
         return f"{kind} with hash {self._own_hash(kind).hex()}"
 
 
-def _check(source: _Source, about: Description) -> None:
-    """Raise PduError if a name differs from another one of its source by case only."""
-    for topic in source.known.values():
-        if topic.name != about.name and topic.name.lower() == about.name.lower():
-            raise PduError(
-                "rx_control_bad",
-                f"{about.name} differs from {topic.name} by upper and lower case only",
-            )
+def _some(sentences: list[str]) -> list[str]:
+    """The first sentences, and how many more there are."""
+    more = len(sentences) - MOST_TOLD
+    return sentences if more <= 0 else [*sentences[:MOST_TOLD], f"and {more} more like the last"]
 
 
 def _kind(about: Description | None) -> tuple[str, bytes] | None:
