@@ -42,6 +42,10 @@ class PduAir:
             "[link]\nbeacon_s = 0.2\n"
         )
 
+    def forge(self, dst: int, pdu: bytes) -> None:
+        """Have robot `dst`, which has sent before, hear a PDU that no robot sent."""
+        self._sockets[dst].sendto(pdu, self._daemons[dst])
+
     def close(self) -> None:
         """Carry nothing any more."""
         self._wake.send(b".")

@@ -1,13 +1,19 @@
 """Rows with whole daemons: loads, other programs that fail, files, signals."""
 
+import json
 import signal
 import subprocess
 import sys
 import time
+from itertools import islice
+from random import Random
 
 import pytest
+from msgspec import to_builtins
 
-from sdrlinkd.client import Publisher
+from benchmarks.fleet.pdu_air import PduAir
+from sdrlinkd.client import Publisher, Subscriber
+from sdrlinkd.wire import Description, Entry, Pdu, build, build_records, pieces
 from tests.scorecard.helpers import (
     CDR,
     Counting,
@@ -20,6 +26,8 @@ from tests.scorecard.helpers import (
 from tests.waiting import wait_for
 
 pytestmark = pytest.mark.long
+HEALTHY, HIT = 251, 252
+ODOM = CDR + bytes(40)
 
 FLOOD = """
     from sdrlinkd.client import Publisher
@@ -209,3 +217,63 @@ def test_row_19_stopped_under_load(start_daemon, lasting, figure):
         assert not [each for each in daemon.directory.iterdir() if each.suffix == ".sock"]
         times += 1
     figure(19, "SIGTERM under load, drain_s = 0.3", f"{times} times, exit within {worst_s:.2f} s")
+
+
+def test_row_20_a_flood_of_declared_topics(start_daemon, lasting, figure):
+    """From 250 ids that nobody has: a healthy robot is heard, and the daemon answers."""
+    ages, waits, n_forged = [], [], 0
+    with PduAir((HEALTHY, HIT)) as air:
+        healthy, hit = (
+            start_daemon(
+                f'auto = true\nnamespace = "robot_{robot}"\nbackend = "gnuradio"\n'
+                f"{air.settings(robot)}pdu_size = 64\n"
+            )
+            for robot in (HEALTHY, HIT)
+        )
+        forged = (
+            build(Pdu(0, False, src, 255, number, 1, [Entry(15, 0, 0, 1, each)]), 64)
+            for number in range(16, 256)
+            for src in range(1, 251)
+            for each in map(build_records, ([p] for p in pieces(number, about(number), 40)))
+        )
+        rng = Random(1)
+        with (
+            Subscriber(f"/rx_robot_{HEALTHY}/odom", runtime_dir=hit.directory) as heard,
+            Publisher(healthy.directory) as out,
+        ):
+            with healthy.control() as control:
+                declared = {"name": f"/robot_{HEALTHY}/odom", "type": "nav_msgs/msg/Odometry"}
+                control.ask("declare", declared)
+
+            def comes():
+                out.send(f"/robot_{HEALTHY}/odom", ODOM)
+                return heard.receive(0.3)
+
+            wait_for(comes)
+            for _ in lasting():
+                for pdu in islice(forged, 13):
+                    air.forge(HIT, pdu)
+                    n_forged += 1
+                if rng.random() < 0.2:
+                    out.send(f"/robot_{HEALTHY}/odom", ODOM)
+                message = heard.receive(0.01)
+                if message is not None and message.age_us is not None:
+                    ages.append(message.age_us / 1e3)
+                if rng.random() < 0.02:
+                    began = time.monotonic()
+                    snapshot = hit.snapshot()
+                    waits.append(time.monotonic() - began)
+        p99 = sorted(ages)[int(0.99 * len(ages))]
+        figure(
+            20, "PDUs that declare 240 topics of each of 250 robots",
+            f"{n_forged} PDUs; status in {1e3 * max(waits):.0f} ms at most; healthy odometry "
+            f"p99 {p99:.0f} ms old; loop lag {snapshot.loop_lag_ms:.0f} ms; "
+            f"{len(json.dumps(to_builtins(snapshot))) >> 10} KiB of snapshot",
+        )  # fmt: skip
+        assert problems(hit) == []
+        assert max(waits) < 5
+        assert len(ages) > 10
+
+
+def about(number):
+    return Description(f"flood/topic_{number}", "std_msgs/msg/String")
