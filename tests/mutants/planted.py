@@ -68,8 +68,8 @@ PLANTED = (
         "F1",
         "a leader that hears less than before and says so goes on leading",
         "sdrlinkd/fleet/election.py",
-        "if leader is not None and claim.rank < leader.rank and claim.gw != leader.gw:",
-        "if leader is not None and claim.rank < leader.rank:",
+        "if leader is not None and leader.beats(claim) and claim.gw != leader.gw:",
+        "if leader is not None and leader.beats(claim):",
     ),
     Planted(
         "F2",
