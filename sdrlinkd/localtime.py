@@ -23,7 +23,9 @@ STEP_NS = SECOND_NS
 SLEPT_NS = SECOND_NS
 """A pause of the event loop in ns after which messages may have waited for it."""
 AFTERWARDS_NS = SECOND_NS // 5
-"""Time in ns after such a pause in which what had waited is read."""
+"""Time in ns after such a pause in which what had waited is read, if the loop turns."""
+TURN_NS, AWAKE_NS = 3 * SECOND_NS // 50, SECOND_NS // 50
+"""Longest ordinary turn of the loop in ns; and for how much of a longer one it counts as awake."""
 
 
 T = TypeVar("T")
@@ -112,19 +114,33 @@ class PublishClock:
 
     def turned(self, own_ns: int) -> None:
         """Note a turn of the event loop; what waited while the loop slept is that old at most."""
-        slept_ns = self._since_turn(own_ns)
-        if slept_ns > SLEPT_NS:
-            self._slept_ns, self._slept_until_ns = slept_ns, own_ns + AFTERWARDS_NS
+        turn_ns = self._since_turn(own_ns)
+        before_ns = self._slept_ns if self._is_reading else 0
+        if turn_ns > SLEPT_NS:
+            self._slept_until_ns = own_ns + AFTERWARDS_NS
+            self._slept_ns = before_ns + turn_ns
+        elif before_ns:
+            # A starved loop sleeps again before it has read what waited.
+            self._slept_until_ns += _asleep_ns(turn_ns)
+            self._slept_ns += _asleep_ns(turn_ns)
         self._turned_ns = own_ns
 
     def age(self, published_ns: int | None, now_ns: int, own_ns: int) -> float:
         """Age in s of a message; without publication time, what it may be after a pause."""
         if published_ns is not None:
             return self.age_s(published_ns, now_ns, own_ns)
-        slept_ns = self._since_turn(own_ns)
-        if slept_ns > SLEPT_NS:
-            return 1e-9 * slept_ns
-        return 1e-9 * self._slept_ns if own_ns < self._slept_until_ns else 0.0
+        turn_ns = self._since_turn(own_ns)
+        before_ns = self._slept_ns if self._is_reading else 0
+        if turn_ns > SLEPT_NS:
+            return 1e-9 * (before_ns + turn_ns)
+        more_ns = _asleep_ns(turn_ns)
+        is_reading = before_ns > 0 and own_ns < self._slept_until_ns + more_ns
+        return 1e-9 * (before_ns + more_ns) if is_reading else 0.0
+
+    @property
+    def _is_reading(self) -> bool:
+        """Whether, at the last turn, what had waited was still being read."""
+        return self._turned_ns is not None and self._turned_ns < self._slept_until_ns
 
     def _since_turn(self, own_ns: int) -> int:
         return 0 if self._turned_ns is None else own_ns - self._turned_ns
@@ -142,3 +158,7 @@ class PublishClock:
         age_ns = now_ns - published_ns
         is_unsure = age_ns > OLDEST_NS and own_ns - self._set_at_ns < OLDEST_NS
         return 0.0 if age_ns < 0 or is_unsure else 1e-9 * age_ns
+
+
+def _asleep_ns(turn_ns: int) -> int:
+    return turn_ns - AWAKE_NS if turn_ns > TURN_NS else 0

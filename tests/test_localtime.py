@@ -122,6 +122,31 @@ def test_what_waited_while_the_loop_slept_is_that_old_at_most():
     assert clock.age(None, NOW_NS, 30 * second) == pytest.approx(30.0)
     clock.turned(30 * second)
     assert clock.age(None, NOW_NS, 30 * second + 1) == pytest.approx(30.0)
+    for at in range(30 * second, 31 * second, second // 100):
+        clock.turned(at)
     assert clock.age(None, NOW_NS, 31 * second) == 0.0
     # Its own word counts where there is one.
     assert clock.age(NOW_NS - second, NOW_NS, 30 * second + 1) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("awake_s", [0.001, 0.008, 0.03, 0.1])
+@pytest.mark.parametrize("asleep_s", [0.07, 0.3, 0.6, 0.99, 1.5])
+def test_a_loop_that_stutters_after_a_pause_takes_nothing_old_for_new(awake_s, asleep_s):
+    """It has to be awake for a while before what it reads counts as new; then all is as before."""
+    clock, awake, asleep = PublishClock(), round(awake_s * 1e9), round(asleep_s * 1e9)
+    clock.turned(0)
+    now, was_awake, ages = 8 * 10**9, 0, []
+    while was_awake < 10**9:
+        # Messages come at the begin and at the end of what it is awake, around the loop's turn.
+        for at in (now, now + awake // 2, now + awake):
+            if at == now + awake // 2:
+                clock.turned(at)
+            ages.append((was_awake, now, clock.age(None, NOW_NS, at)))
+        was_awake += awake
+        now += awake + asleep
+    for was_awake, at, age in ages:
+        if was_awake < 8e6:
+            assert age >= 1e-9 * at - 0.2, (was_awake, at, age)
+    for at in range(now - asleep, now + 2 * 10**9, 10**7):
+        clock.turned(at)
+    assert clock.age(None, NOW_NS, now + 2 * 10**9) == 0.0
