@@ -4,7 +4,6 @@ import contextlib
 import socket
 import struct
 import time
-from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -13,6 +12,7 @@ import websocket
 from sdrlinkd.client import Subscriber
 from tests.conftest import daemons
 from tests.doors.accounts import OTHER_ACCOUNTS, status_for
+from tests.doors.sockets import ports
 from tests.foxglove.conftest import SETTINGS, bridge_to, url_of
 from tests.foxglove.viewer import SUBPROTOCOL, Viewer
 from tests.pairs import pair
@@ -97,10 +97,9 @@ def test_without_the_token_nobody_comes_in_where_commands_do(seen):
 @pytest.mark.slow
 def test_the_sdks_own_port_takes_no_commands(seen):
     """Programs of this computer may find it: they see, and command nothing."""
-    door, *inner = ports_of(seen.bridge.pid, urlsplit(seen.url).port)
-    assert door == urlsplit(seen.url).port
-    assert len(inner) == 1
-    with seen.hearing() as hears, Viewer(f"ws://127.0.0.1:{inner[0]}") as viewer:
+    door = urlsplit(seen.url).port
+    (inner,) = {port for _, _, port in ports(seen.bridge.pid)} - {door}
+    with seen.hearing() as hears, Viewer(f"ws://127.0.0.1:{inner}") as viewer:
         viewer.until(lambda: viewer.info)
         for number, topic in ((1, "/robot_1/cmd_vel"), ((1 << 32) - 1, "/robot_1/cmd_x")):
             viewer.advertise(number, topic)
@@ -162,18 +161,3 @@ def test_half_open_and_nonsense_leave_room_for_others(seen):
                     each.sendall(data)
         time.sleep(0.2)
         wait_for(lambda: refusal(seen.url, None)[0] == 101)
-
-
-def ports_of(pid, first):
-    """The TCP ports at which a process listens, `first` first."""
-    inodes = set()
-    for each in Path(f"/proc/{pid}/fd").iterdir():
-        with contextlib.suppress(OSError):
-            inodes.add(str(each.readlink()).removeprefix("socket:[").removesuffix("]"))
-    ports = set()
-    for table in ("tcp", "tcp6"):
-        for line in Path(f"/proc/{pid}/net/{table}").read_text().splitlines()[1:]:
-            columns = line.split()
-            if columns[3] == "0A" and columns[9] in inodes:
-                ports.add(int(columns[1].rpartition(":")[2], 16))
-    return sorted(ports, key=lambda port: port != first)
