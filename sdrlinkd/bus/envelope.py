@@ -56,6 +56,7 @@ class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
     late: bool = False
     sr: int | None = None
     v: int | None = None
+    se: bool = False
 
 
 class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -26,6 +26,7 @@ def header_of(
         ts=times.sampled_ns,
         es=times.sampled_error_us,
     )
+    header.se = message.is_sealed
     if header.s != message.src:
         header.v = message.src
     if message.series != message.topic_id:

@@ -119,6 +119,7 @@ def _recorded(message: Message, is_latched: bool) -> Iterator[Recorded]:
         "snr_db": message.snr_db,
         "lost_pdus": message.lost_pdus,
         "late": message.is_late,
+        "sealed": message.is_sealed,
     }
     text = cdr_from_fields(TEXT, {"data": json.dumps(fields)}, RECEPTIONS)
     yield Recorded(RECEPTIONS, TEXT, text, received_ns, received_ns)

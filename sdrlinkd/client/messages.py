@@ -42,7 +42,8 @@ class Message:
     `series` tells apart the messages of several producers of one declared topic; it is 0 for the
     first producer, and for topics of the registry. `name` tells the message from others at all
     robots that hear it; stop messages have none. `via` is the robot of the gateway that sent the
-    message for `source`, which is on another air; None if `source` sent it itself.
+    message for `source`, which is on another air; None if `source` sent it itself. `is_sealed`
+    tells that all of it came sealed, so that somebody with the team's key has sent it.
     """
 
     topic: str
@@ -67,6 +68,7 @@ class Message:
     series: int = 0
     name: MessageName | None = None
     via: int | None = None
+    is_sealed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +138,7 @@ def decode_in(frames: Sequence[bytes]) -> Message | None:
         reassembly_us=fields.get("dr"),
         on_air_us=fields.get("da"),
         is_stop=fields.get("stop", False),
+        is_sealed=fields.get("se", False),
         is_late=fields.get("late", False),
         series=fields.get("sr", 0),
         name=name_in(fields),

@@ -61,11 +61,14 @@ class Partial:
     """Pieces of parity fragments, by offset and then by number."""
     pdus: tuple[int, int] = (0, 0)
     """Numbers of the first and the last PDU with something of the message."""
+    is_sealed: bool = True
+    """Whether all of these PDUs were sealed."""
 
-    def note_pdu(self, number: int) -> None:
+    def note_pdu(self, number: int, *, is_sealed: bool) -> None:
         """Note the number of another PDU with something of the message."""
         first, last = self.pdus
         self.pdus = min(first, number), max(last, number)
+        self.is_sealed = self.is_sealed and is_sealed
 
 
 @dataclass(slots=True)
@@ -79,6 +82,7 @@ class Large:
     entry_id: int = NO_ENTRY
     """Entry id of the last part; NO_ENTRY until that is there."""
     cost: int = PARTIAL_OVERHEAD
+    is_sealed: bool = True
     is_overtaken: bool = False
     """Whether a part of a later message of the topic has come."""
 

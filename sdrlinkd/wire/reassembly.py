@@ -36,9 +36,15 @@ class Reassembly:
         """Arrival time of the first fragment of the message that `add` returned last."""
         self.pdus = 0, 0
         """Numbers of the first and the last PDU with something of that message."""
+        self.is_sealed = False
+        """Whether all PDUs with something of that message were sealed."""
 
-    def add(self, src: int, entry: Entry, now: float, pdu_number: int = 0) -> bytes | None:
-        """Take one entry; returns the message if that completes it, else None."""
+    def add(
+        self, src: int, entry: Entry, now: float, pdu_number: int = 0, *, is_sealed: bool = False
+    ) -> bytes | None:
+        """Take one entry, of a PDU that was sealed or not; returns the message if that completes
+        it, else None.
+        """
         topic_id, entry_id, index, total, payload = entry
         source = self._sources.get(src)
         if total == 1:
@@ -46,7 +52,7 @@ class Reassembly:
                 self._give_up(src, source, (topic_id, entry_id), "rx_partial_superseded")
             self.started += topic_id != PARTS
             self.began_at = now
-            self.pdus = pdu_number, pdu_number
+            self.pdus, self.is_sealed = (pdu_number, pdu_number), is_sealed
             return payload
         if source is None:
             source = self._sources[src] = Source()
@@ -65,12 +71,12 @@ class Reassembly:
             partial.pdus = pdu_number, pdu_number
         elif index in partial.parts:
             return None
-        partial.note_pdu(pdu_number)
+        partial.note_pdu(pdu_number, is_sealed=is_sealed)
         if len(partial.parts) == total - 1:
             partial.parts[index] = payload
             self._remove(source, key)
             self.began_at = partial.began_at
-            self.pdus = partial.pdus
+            self.pdus, self.is_sealed = partial.pdus, partial.is_sealed
             return b"".join([partial.parts[i] for i in range(total)])
         partial.parts[index] = payload
         self._keep(src, source, key, len(payload), now)
@@ -100,6 +106,7 @@ class Reassembly:
                 other.is_overtaken |= topic_id == part.topic_id and other is not large
         source.large.move_to_end(key)
         large.touched_at = now
+        large.is_sealed = large.is_sealed and self.is_sealed
         if part.part == part.parts - 1:
             large.entry_id = entry_id
         if part.part not in large.parts:
@@ -111,13 +118,15 @@ class Reassembly:
         self._next_expiry = min(self._next_expiry, now + self._limits.timeout_s)
         if len(large.parts) == large.n_parts:
             self._remove_large(source, key)
-            self.began_at = large.began_at
+            self.began_at, self.is_sealed = large.began_at, large.is_sealed
             whole = b"".join([large.parts[i] for i in range(large.n_parts)])
             return Joined(part.topic_id, whole, large.entry_id, part.number)
         self._keep_bounds(src, source)
         return None
 
-    def hold(self, src: int, parity: Parity, now: float, pdu_number: int = 0) -> Partial | None:
+    def hold(
+        self, src: int, parity: Parity, now: float, pdu_number: int = 0, *, is_sealed: bool = False
+    ) -> Partial | None:
         """Keep parity with its incomplete message and return that message.
 
         None if no such message is held, or if the parity is not new or does not match it.
@@ -136,7 +145,7 @@ class Reassembly:
         ):
             return None
         partial.shape = shape
-        partial.note_pdu(pdu_number)
+        partial.note_pdu(pdu_number, is_sealed=is_sealed)
         partial.parity.setdefault(parity.at, pieces)[parity.number] = parity.data
         self._keep(src, source, key, len(parity.data), now)
         return source.partials.get(key)

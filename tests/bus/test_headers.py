@@ -34,6 +34,8 @@ def test_a_consumer_is_told_all_that_is_known_of_a_message():
         "dw": 250_000, "dr": 250_000, "da": 125_000, "b": 9, "e": 300, "pn": 70, "ps": 4,
         **{short: getattr(times, long) for long, short in fields.items()},
     }  # fmt: skip
+    sealed = msgspec.to_builtins(header_of(delivered()._replace(is_sealed=True), 0.75, 99, times))
+    assert sealed == {**told, "se": True}
     nothing = LocalTimes(*[None] * 4)
     told = msgspec.to_builtins(
         header_of(delivered("@5/map", 21, is_numbered=False), None, 99, nothing)

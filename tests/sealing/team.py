@@ -40,12 +40,13 @@ TIMERS_S = 0.05
 
 
 class Heard(NamedTuple):
-    """A message at a robot: when it came, by true time, and the age that its link told."""
+    """A message at a robot: when it came, by true time, the age that its link told, its seal."""
 
     at: float
     src: int
     payload: bytes
     age_s: float | None
+    is_sealed: bool
 
 
 @dataclass
@@ -135,7 +136,7 @@ class Robot:
         at = self.clock(now)
         for message in self.link.hear(data, at, 20.0, at, at):
             age_s = self.link.delivered(message, at)
-            self.heard.append(Heard(now, message.src, message.payload, age_s))
+            self.heard.append(Heard(now, message.src, message.payload, age_s, message.is_sealed))
 
 
 class Team:

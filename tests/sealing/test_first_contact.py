@@ -156,7 +156,8 @@ def test_clear_is_accepted_on_request_but_not_from_who_sealed_once():
     send(team, 2)
     send(team, 3)
     team.run(0.5)
-    assert {each.src for each in team.robots[1].heard} == {2, 3}
+    heard = {each.src: each.is_sealed for each in team.robots[1].heard}
+    assert heard == {2: False, 3: True}
     # Robot 3 begins to send in the clear, or somebody does in its name.
     for is_new_life in (False, True):
         if is_new_life:

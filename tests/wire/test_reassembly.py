@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.wire import Entry, Parity, Reassembly, ReassemblyLimits
+from sdrlinkd.wire import PARTS, Entry, Parity, Part, Reassembly, ReassemblyLimits
 from tests.laws import law
 
 SEED = 53
@@ -169,6 +169,33 @@ def test_sources_and_topics_do_not_mix():
         last = Entry(topic_id, entry_id, 1, 2, b"!")
         assert reassembly.add(src, last, 0.0) == bytes([src, topic_id, entry_id]) + b"!"
     assert lost_of(reassembly) == []
+
+
+@pytest.mark.parametrize("is_sealed", list(product((True, False), repeat=3)))
+def test_a_message_is_sealed_if_all_of_it_was(is_sealed):
+    """Its fragments, and its parity, even if no octet of that was needed."""
+    reassembly = make()
+    sealed_first, sealed_parity, sealed_last = is_sealed
+    reassembly.add(1, Entry(3, 7, 0, 2, b"a"), 0.0, 1, is_sealed=sealed_first)
+    parity = Parity(3, 7, 2, 1, 0, 0, 1, 2, b"p")
+    held = reassembly.hold(1, parity, 0.0, 2, is_sealed=sealed_parity)
+    whole = reassembly.add(1, Entry(3, 7, 1, 2, b"b"), 0.0, 3, is_sealed=sealed_last)
+    assert whole == b"ab"
+    counts = (sealed_first, sealed_last, *([sealed_parity] if held is not None else []))
+    assert reassembly.is_sealed == all(counts)
+    assert held is not None
+    reassembly.add(1, Entry(3, 8, 0, 1, b"c"), 0.0, 4, is_sealed=sealed_last)
+    assert reassembly.is_sealed == sealed_last
+
+
+@pytest.mark.parametrize("is_sealed", [(True, True), (True, False), (False, True)])
+def test_a_large_message_is_sealed_if_all_of_its_parts_were(is_sealed):
+    reassembly = make()
+    for at, sealed in enumerate(is_sealed):
+        assert reassembly.add(1, Entry(PARTS, at, 0, 1, b"x"), 0.0, at, is_sealed=sealed) == b"x"
+        joined = reassembly.join(1, at, Part(20, 5, at, 2, b"data"), 0.0)
+    assert joined.payload == b"datadata"
+    assert reassembly.is_sealed == all(is_sealed)
 
 
 @pytest.mark.parametrize("total", [2, 255])

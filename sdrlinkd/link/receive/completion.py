@@ -97,7 +97,7 @@ class Completion:
             Delivered(
                 src, topic.base, payload, tally.delivered, lost_pdus, message.origin.at,
                 message.heard_at, message.hops_left, message.snr_db, message.began_at,
-                message.ended_at, number, topic, message.name, message.to_one,
+                message.ended_at, number, topic, message.name, message.to_one, message.is_sealed,
             )
         )  # fmt: skip
 

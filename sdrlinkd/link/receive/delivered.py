@@ -73,6 +73,8 @@ class Delivered(NamedTuple):
     name: MessageName = UNNAMED_MESSAGE
     to_one: bool = False
     """Whether it was sent to one robot."""
+    is_sealed: bool = False
+    """Whether all of it came sealed."""
 
     def parts(self, now: float) -> Parts:
         """The parts of the message's age at `now`; without a STAMP the wait counts as 0."""

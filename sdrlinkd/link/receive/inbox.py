@@ -163,7 +163,10 @@ class Inbox:
             elif isinstance(record, Repeat) and not is_relayed and admitted.is_proven:
                 self._ledger.skip_records(not self._repeated.take(record, pdu.src, track, at))
         self._records.take(pdu, admitted, neighbor, records, is_relayed, now, events)
-        repaired = self._repaired(pdu.src, records, at, track.number) if records else []
+        repaired = []
+        if records:
+            is_sealed = admitted.ticks is not None
+            repaired = self._repaired(pdu.src, records, at, track.number, is_sealed=is_sealed)
         if self._reassembly.lost:
             # Parity takes memory, too, so older messages may have been evicted.
             self._note_lost(now, events)
@@ -237,12 +240,14 @@ class Inbox:
         self._completion.forget(src, now, events)
         self._topics.forget(src)
 
-    def _repaired(self, src: int, records: list[Record], at: float, pdu_number: int) -> list[Entry]:
+    def _repaired(
+        self, src: int, records: list[Record], at: float, pdu_number: int, *, is_sealed: bool
+    ) -> list[Entry]:
         """Missing fragments that can be computed now, with the parity in `records`."""
         partials = {}
         for record in records:
             if isinstance(record, Parity) and is_sound(record):
-                partial = self._reassembly.hold(src, record, at, pdu_number)
+                partial = self._reassembly.hold(src, record, at, pdu_number, is_sealed=is_sealed)
                 if partial is not None:
                     partials[record.topic_id, record.entry_id] = partial
         entries = [
@@ -264,11 +269,12 @@ class Inbox:
     ) -> None:
         src, at = pdu.src, admitted.at
         reassembly, pdu_number = self._reassembly, neighbor.track.number
+        is_sealed = admitted.ticks is not None
         for entry in entries:
             topic_id = entry.topic_id
             if topic_id == CONTROL_TOPIC_ID and self._has_control:
                 continue
-            payload = reassembly.add(src, entry, at, pdu_number)
+            payload = reassembly.add(src, entry, at, pdu_number, is_sealed=is_sealed)
             if payload is None:
                 continue
             stamped = (topic_id, entry.entry_id)
@@ -284,7 +290,7 @@ class Inbox:
             message = Whole(
                 src, topic_id, payload, pdu.compressed, self._ages.take(src, *stamped), stamped, at,
                 admitted.ended_at, reassembly.began_at, pdu.hop, neighbor.snr_db,
-                name, admitted.is_proven, pdu.dst != BROADCAST,
+                name, admitted.is_proven, pdu.dst != BROADCAST, reassembly.is_sealed,
             )  # fmt: skip
             self._completion.take(message, now, events)
         if reassembly.lost:

@@ -40,6 +40,8 @@ class Whole(NamedTuple):
     """Whether its source has proven to be alive."""
     to_one: bool = False
     """Whether it was sent to one robot."""
+    is_sealed: bool = False
+    """Whether all of it came sealed."""
 
 
 @dataclass(slots=True)
