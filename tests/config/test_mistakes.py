@@ -7,7 +7,7 @@ import pytest
 from msgspec import inspect
 
 from sdrlinkd.__main__ import main
-from sdrlinkd.config.schema import Config
+from sdrlinkd.config import Config
 
 ETC = Path(__file__).parents[2] / "etc"
 
@@ -37,7 +37,7 @@ def test_every_whole_number_has_a_largest_and_a_smallest_value():
                         walk(each, name)
 
     walk(inspect.type_info(Config), "")
-    assert {"Config.seed", "Config.rx_depth", "TopicSettings.depth"} <= set(found)
+    assert {"Config.seed", "Config.rx_depth", "TopicPolicy.depth"} <= set(found)
 
 
 # Content of the file, the cited line (0: none), and the message.
