@@ -96,8 +96,9 @@ class Acquisition:
         `whole` `[n]` is the share of each symbol's samples that were not blanked; None: all.
         """
         channel = self._channel.content
-        channel.kept[: self._n_marked] = channel.whole[: self._n_marked] = 1
-        self._n_marked = 0
+        if self._n_marked:
+            channel.kept[: self._n_marked] = channel.whole[: self._n_marked] = 1
+            self._n_marked = 0
         if kept is not None:
             self._n_marked = len(kept)
             channel.kept[: len(kept), : self._grid.n_used] = kept[:, self._grid.tones]

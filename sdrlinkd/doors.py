@@ -9,16 +9,15 @@ from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
-LOCAL_NAMES = ("localhost", "127.0.0.1", "::1")
 ROOT = 0
 _TABLES = (Path("/proc/net/tcp"), Path("/proc/net/tcp6"))
 _LOCAL, _REMOTE, _UID = 1, 2, 7
 """Columns of the kernel's tables."""
 
 
-def new_token() -> str:
-    """A token that nobody guesses."""
-    return secrets.token_urlsafe(18)
+def token_from(variable: str) -> str:
+    """The token in an environment variable, or else a new one that nobody guesses."""
+    return os.environ.get(variable) or secrets.token_urlsafe(18)
 
 
 def is_token(given: str, token: str) -> bool:
@@ -39,17 +38,24 @@ def split(url: str) -> SplitResult:
         return urlsplit("")
 
 
+def is_local(host: str) -> bool:
+    """Whether only programs of this computer reach what listens at `host`."""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
 def is_local_name(host: str) -> bool:
     """Whether a Host header, with or without a port, names this computer."""
-    return split(f"//{host}").hostname in LOCAL_NAMES
+    return is_local(split(f"//{host}").hostname or "")
 
 
 def is_allowed(origin: str, allowed: Iterable[str]) -> bool:
     """Whether a page of this origin may come in: one of this computer, or one that is `allowed`."""
     parts = split(origin)
-    return origin in allowed or (
-        parts.scheme in ("http", "https") and parts.hostname in LOCAL_NAMES
-    )
+    is_own = parts.scheme in ("http", "https") and is_local(parts.hostname or "")
+    return is_own or origin in allowed
 
 
 def is_ours(peer: tuple[str, int], own: tuple[str, int]) -> bool:

@@ -115,14 +115,12 @@ class PublishClock:
     def turned(self, own_ns: int) -> None:
         """Note a turn of the event loop; what waited while the loop slept is that old at most."""
         turn_ns = self._since_turn(own_ns)
-        before_ns = self._slept_ns if self._is_reading else 0
-        if turn_ns > SLEPT_NS:
-            self._slept_until_ns = own_ns + AFTERWARDS_NS
-            self._slept_ns = before_ns + turn_ns
-        elif before_ns:
+        if self._is_reading:
             # A starved loop sleeps again before it has read what waited.
             self._slept_until_ns += _asleep_ns(turn_ns)
             self._slept_ns += _asleep_ns(turn_ns)
+        elif turn_ns > SLEPT_NS:
+            self._slept_ns, self._slept_until_ns = turn_ns, own_ns + AFTERWARDS_NS
         self._turned_ns = own_ns
 
     def age(self, published_ns: int | None, now_ns: int, own_ns: int) -> float:
@@ -130,12 +128,10 @@ class PublishClock:
         if published_ns is not None:
             return self.age_s(published_ns, now_ns, own_ns)
         turn_ns = self._since_turn(own_ns)
-        before_ns = self._slept_ns if self._is_reading else 0
-        if turn_ns > SLEPT_NS:
-            return 1e-9 * (before_ns + turn_ns)
         more_ns = _asleep_ns(turn_ns)
-        is_reading = before_ns > 0 and own_ns < self._slept_until_ns + more_ns
-        return 1e-9 * (before_ns + more_ns) if is_reading else 0.0
+        if self._is_reading and own_ns < self._slept_until_ns + more_ns:
+            return 1e-9 * (self._slept_ns + more_ns)
+        return 1e-9 * turn_ns if turn_ns > SLEPT_NS else 0.0
 
     @property
     def _is_reading(self) -> bool:

@@ -1,4 +1,4 @@
-"""Makes messages from fields that people write in TOML or YAML, checked against their type."""
+"""Makes and checks messages by their type: fields that people write, and octets of others."""
 
 import dataclasses
 import difflib

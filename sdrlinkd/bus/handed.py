@@ -25,8 +25,8 @@ def header_of(
         eb=times.published_error_us,
         ts=times.sampled_ns,
         es=times.sampled_error_us,
+        se=message.is_sealed,
     )
-    header.se = message.is_sealed
     if header.s != message.src:
         header.v = message.src
     if message.series != message.topic_id:

@@ -11,7 +11,8 @@ from sdrlinkd.calls.repeats import FIRST_RTT_S, MOST_TRIES, RESULT_KEPT_S, Repea
 UNKNOWN_AGE_S = 60.0
 """Age in s that a request is taken to have if it is not known."""
 KEPT_S = 120.0
-"""Time in s for which an answer is kept, in case its request comes again."""
+"""Time in s for which an answer is kept, in case its request comes again; an older one is refused,
+as it may be one that was executed and forgotten."""
 MOST_TURNED_AWAY = 1024
 
 
@@ -127,7 +128,7 @@ class Answerer:
     def _refusal(self, packet: Packet, took_s: float | None, now: float) -> int:
         # A result can be asked for as often as one likes.
         age_s = packet.age_s + (UNKNOWN_AGE_S if took_s is None else took_s)
-        is_older = age_s > now - self._began_at
+        is_older = age_s > min(now - self._began_at, KEPT_S)
         return Status.RESTARTED if is_older and not packet.is_long else Status.OK
 
 

@@ -1,9 +1,7 @@
 """`bridge foxglove`: the link, what it carries, and where robots are, in Foxglove."""
 
 import asyncio
-import ipaddress
 import logging
-import os
 from typing import Annotated
 from urllib.parse import urlencode
 
@@ -13,7 +11,7 @@ import uvloop
 from sdrlinkd.cli.app import RuntimeDir, app
 from sdrlinkd.cli.completion import heard_names
 from sdrlinkd.cli.listening import host_and_port
-from sdrlinkd.doors import new_token
+from sdrlinkd.doors import is_local, token_from
 from sdrlinkd.extras import needs
 from sdrlinkd.journal import log_to_stderr
 
@@ -69,11 +67,8 @@ def foxglove(
         from sdrlinkd.foxglove import FOXGLOVE, Rules, run_bridge
     host, port = host_and_port(listen, "--listen", LISTEN)
     patterns = publish or []
-    rules = Rules(
-        _is_local(host),
-        (os.environ.get(TOKEN) or new_token()) if token or patterns else "",
-        (*FOXGLOVE, *(allow_origin or [])),
-    )
+    asked = token_from(TOKEN) if token or patterns else ""
+    rules = Rules(is_local(host), asked, (*FOXGLOVE, *(allow_origin or [])))
 
     def started(bound: int) -> None:
         shown = f"[{host}]" if ":" in host else host
@@ -94,14 +89,7 @@ def meanings(host: str, patterns: list[str], *, has_token: bool) -> list[str]:
     told = []
     if patterns:
         told.append(f"who has this address may command {', '.join(patterns)}: keep it to yourself")
-    if not _is_local(host):
+    if not is_local(host):
         who = "who has this address" if has_token else "anybody who reaches it (see --token)"
         told.append(f"{who} sees all that robots send at {host}: there is no encryption")
     return told
-
-
-def _is_local(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"

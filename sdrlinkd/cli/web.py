@@ -1,7 +1,6 @@
 """`web`: the page for operators."""
 
 import asyncio
-import os
 import re
 from functools import partial
 from pathlib import Path
@@ -13,7 +12,7 @@ from sdrlinkd.cli.app import RuntimeDirs, app
 from sdrlinkd.cli.listening import host_and_port
 from sdrlinkd.cli.listing import directories
 from sdrlinkd.config import ENDPOINT, FLEET_NAME, FleetParams
-from sdrlinkd.doors import new_token
+from sdrlinkd.doors import token_from
 from sdrlinkd.errors import UserError
 from sdrlinkd.extras import needs
 
@@ -79,7 +78,7 @@ def web(
         )
     host, port = host_and_port(listen, "--listen", "127.0.0.1:8420")
     options = Options(
-        host, port, (os.environ.get(TOKEN) or new_token()) if token or control else "", control,
+        host, port, token_from(TOKEN) if token or control else "", control,
         tls_cert, tls_key, None if floor_plan is None else read_floor_plan(floor_plan),
     )  # fmt: skip
     world = World()

@@ -29,7 +29,6 @@ from sdrlinkd.fleet.ros import FromRos, RosSide
 from sdrlinkd.fleet.samples import Answer, Sample
 from sdrlinkd.fleet.session import Session, open_session
 from sdrlinkd.fleet.upward import SETTLED_S, UpwardMessages
-from sdrlinkd.fleet.zenoh_config import make_zenoh_config
 from sdrlinkd.reports import Snapshot
 
 TICK_S = 0.05
@@ -289,12 +288,9 @@ def _now() -> float:
 
 async def run_gateway(setup: Setup, folder: Path) -> None:
     """Run a gateway until cancelled; file names are relative to `folder`. Raises UserError."""
-    params = setup.config.fleet
-    session = await open_session(params, folder)
+    session = await open_session(setup.config.fleet, folder)
     try:
-        if params.down or params.bridge:
-            config = make_zenoh_config(params, folder)
-            await check_doors(session, config, params, setup.node_id)
+        await check_doors(session, setup.config.fleet, setup.node_id)
         with ungrouped():
             await Gateway(setup, session).run()
     finally:

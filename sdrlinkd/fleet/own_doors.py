@@ -24,29 +24,32 @@ _STRANGE = b"\xc1"
 _log = logging.getLogger(__name__)
 
 
-async def check_doors(
-    session: Session, config: zenoh.Config, params: FleetParams, own_id: int
-) -> None:
-    """Put something at each endpoint without a certificate. Raises ConfigError if it arrives.
+async def check_doors(session: Session, params: FleetParams, own_id: int) -> None:
+    """If commands are taken, put something at each endpoint without a certificate.
 
-    What a router lets through may change while the gateway runs, so it is named in the log.
+    Raises ConfigError if it arrives. What a router lets through may change while the gateway runs,
+    so it is named in the log.
     """
-    doors, routers = endpoints(config, "listen"), endpoints(config, "connect")
+    if not (params.down or params.bridge):
+        return
+    doors, routers = (endpoints(session.config, end) for end in ("listen", "connect"))
     for each in routers:
         _log.warning("the Zenoh router at %s decides who may command robots", each)
     topics = [each.replace("*", "x") for each in (*params.down, *params.bridge)]
     keys = [Keys(params.name).message(own_id, each) for each in topics[:MOST_TRIED]]
-    for each in [*doors, *routers]:
-        if await _lets_strangers(session, config, keys, each):
+    if params.ros_domain is not None:
+        keys.append(f"{params.ros_domain}/door")
+    tried = [*doors, *routers]
+    opened = await asyncio.gather(*(_lets_strangers(session, keys, each) for each in tried))
+    for each, is_open in zip(tried, opened, strict=True):
+        if is_open:
             raise ConfigError(
                 f'"{each}": a program without a certificate may command robots there; allowed: '
                 "endpoints that ask for one (enable_mtls), or access control that denies by default"
             )
 
 
-async def _lets_strangers(
-    session: Session, config: zenoh.Config, keys: list[str], endpoint: str
-) -> bool:
+async def _lets_strangers(session: Session, keys: list[str], endpoint: str) -> bool:
     arrived, mark = asyncio.Event(), secrets.token_bytes(8)
 
     def take(sample: Sample) -> None:
@@ -55,7 +58,7 @@ async def _lets_strangers(
 
     ends = [session.subscribe(key, take) for key in keys]
     try:
-        stranger = await asyncio.to_thread(_open, _strangers(config, endpoint))
+        stranger = await asyncio.to_thread(_open, _strangers(session.config, endpoint))
         if stranger is None:
             return False
         try:

@@ -43,8 +43,12 @@ _QOS = {
 class Session:
     """A Zenoh session on the running event loop. It finds a router again by itself."""
 
-    def __init__(self, session: zenoh.Session, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self, session: zenoh.Session, config: zenoh.Config, loop: asyncio.AbstractEventLoop
+    ) -> None:
         self._session = session
+        self.config = config
+        """With which it was opened."""
         self._loop = loop
         self._waiting: deque[Callable[[], None]] = deque()
         self._is_draining = False
@@ -284,7 +288,7 @@ async def open_session(params: FleetParams, folder: Path) -> Session:
     while True:
         try:
             session = await asyncio.to_thread(zenoh.open, config)
-            return Session(session, asyncio.get_running_loop())
+            return Session(session, config, asyncio.get_running_loop())
         except zenoh.ZError as error:
             if UNREACHED not in str(error):
                 raise UserError(f"Zenoh cannot be opened: {cause(error)}") from None

@@ -1,6 +1,7 @@
 """Zenoh's configuration, from `[fleet]` and a file of Zenoh's own."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,7 @@ def make_zenoh_config(params: FleetParams, folder: Path) -> zenoh.Config:
     config.insert_json5("connect/retry", json.dumps(RETRY))
     for key in ("down", "bridge"):
         if getattr(params, key):
-            _check_doors(config, key, Keys(params.name).all_commands)
+            _check_doors(config, key, params)
     return config
 
 
@@ -60,11 +61,8 @@ def _says_where(config: zenoh.Config) -> bool:
     return any(config.get_json(key) != plain.get_json(key) for key in keys)
 
 
-def _check_doors(config: zenoh.Config, key: str, robots: str) -> None:
-    """Refuse to send to robots what anybody on the network may have put. Raises ConfigError.
-
-    `robots` is the key at which commands to robots are put.
-    """
+def _check_doors(config: zenoh.Config, key: str, params: FleetParams) -> None:
+    """Refuse to send to robots what anybody on the network may have put. Raises ConfigError."""
     listen, connect = endpoints(config, "listen"), endpoints(config, "connect")
     open_ones = [each for each in connect if not _is_tls(each)]
     if open_ones or not (listen or connect):
@@ -83,7 +81,11 @@ def _check_doors(config: zenoh.Config, key: str, robots: str) -> None:
             f'"{listen[0]}"; use tls/ or quic/ endpoints where transport/link/tls has enable_mtls '
             f"and a root_ca_certificate ({_MAKE}), or access_control that denies by default"
         )
-    if fault := _fault(rules, robots):
+    # Nodes on rmw_zenoh put messages, and call services by queries.
+    entrances = {Keys(params.name).all_commands: {"put"}}
+    if params.ros_domain is not None:
+        entrances[f"{params.ros_domain}/**"] = {"put", "query"}
+    if fault := _fault(rules, entrances):
         raise ConfigError(
             f"fleet.{key} sends to robots what others put on Zenoh, and access_control {fault}"
         )
@@ -105,25 +107,30 @@ def _is_tls(endpoint: str) -> bool:
     return endpoint.split("/")[0] in SAFE_PROTOCOLS
 
 
-def _fault(rules: dict[str, Any], robots: str) -> str:
-    """Why rules of access control let anybody command robots; empty if they do not."""
+def _fault(rules: dict[str, Any], entrances: Mapping[str, set[str]]) -> str:
+    """Why rules of access control let anybody command robots; empty if they do not.
+
+    `entrances` are the keys by which robots are commanded, and the kinds of messages.
+    """
     if rules.get("default_permission") != "deny":
         return f'has default_permission {rules.get("default_permission")!r}; allowed: "deny"'
     subjects = {each["id"]: each for each in rules.get("subjects") or ()}
     allowing = {
-        each["id"]
-        for each in rules.get("rules") or ()
-        if each["permission"] == "allow"
-        and "put" in each["messages"]
-        and any(zenoh.KeyExpr(key).intersects(zenoh.KeyExpr(robots)) for key in each["key_exprs"])
+        rule["id"]: entrance
+        for rule in rules.get("rules") or ()
+        for entrance, kinds in entrances.items()
+        if rule["permission"] == "allow"
+        and not kinds.isdisjoint(rule["messages"])
+        and any(zenoh.KeyExpr(key).intersects(zenoh.KeyExpr(entrance)) for key in rule["key_exprs"])
     }
     for policy in rules.get("policies") or ():
-        for name in policy["subjects"] if allowing & {*policy["rules"]} else ():
+        opened = [allowing[each] for each in policy["rules"] if each in allowing]
+        for name in policy["subjects"] if opened else ():
             subject = subjects.get(name, {})
             if not (subject.get("cert_common_names") or subject.get("usernames")):
                 return (
-                    f"lets subject {name!r} put at {robots}, who may be anybody; allowed: subjects "
-                    "with cert_common_names or usernames"
+                    f"lets subject {name!r} command at {opened[0]}, who may be anybody; allowed: "
+                    "subjects with cert_common_names or usernames"
                 )
     return ""
 

@@ -30,7 +30,9 @@ MOST_HEAD = 16384
 """Longest head of a request or an answer in octets."""
 HEAD_S = 5.0
 """Time in s for the head of a request to come."""
-MOST_CLIENTS = 64
+MOST_CLIENTS, MOST_WAITING = 64, 256
+"""Most clients at once, and most connections that have not said yet what they want: of those, the
+oldest gives way."""
 AT_ONCE = 1 << 16
 CHANNEL = (1 << 32) - 1
 """Number of the channel that the door advertises; clients count from 1."""
@@ -78,6 +80,7 @@ class Door:
         self._inner = inner
         self._server: asyncio.Server | None = None
         self._clients = 0
+        self._waiting: dict[asyncio.StreamWriter, None] = {}
         self.refused = 0
         """Connections that were refused."""
 
@@ -96,31 +99,48 @@ class Door:
             self._server.close()
 
     async def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._clients += 1
         try:
             # A client may end as it likes; so may the loop, which would report those left.
             with contextlib.suppress(*_ENDS):
                 await self._serve(reader, writer)
         finally:
-            self._clients -= 1
             writer.close()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
-            async with asyncio.timeout(HEAD_S):
-                head = await reader.readuntil(b"\r\n\r\n")
+            head = await self._head(reader, writer)
             target, headers = _parsed(head)
         except (asyncio.LimitOverrunError, http.client.HTTPException, ValueError):
             await _refuse(writer, 400, "this is no request for a WebSocket")
             return
         peer, own = (writer.get_extra_info(name)[:2] for name in ("peername", "sockname"))
         sentence = self._rules.refusal(target, headers, peer, own)
-        if not sentence and self._clients > MOST_CLIENTS:
+        if not sentence and self._clients >= MOST_CLIENTS:
             sentence = f"got one client more; allowed: {MOST_CLIENTS} at once"
         if sentence:
             self.refused += 1
             await _refuse(writer, 403, sentence)
             return
+        self._clients += 1
+        try:
+            await self._connect(head, reader, writer)
+        finally:
+            self._clients -= 1
+
+    async def _head(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bytes:
+        """The head of a request. Raises LimitOverrunError, and what ends a connection."""
+        self._waiting[writer] = None
+        if len(self._waiting) > MOST_WAITING:
+            next(iter(self._waiting)).close()
+        try:
+            async with asyncio.timeout(HEAD_S):
+                return await reader.readuntil(b"\r\n\r\n")
+        finally:
+            self._waiting.pop(writer, None)
+
+    async def _connect(
+        self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
         to, back = await asyncio.open_connection("127.0.0.1", self._inner, limit=MOST_HEAD)
         try:
             # The token is for nobody else.

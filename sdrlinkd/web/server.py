@@ -13,7 +13,7 @@ import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
 
-from sdrlinkd.doors import LOCAL_NAMES
+from sdrlinkd.doors import is_local
 from sdrlinkd.errors import UserError, ungrouped
 from sdrlinkd.web.floor_plan import FloorPlan
 from sdrlinkd.web.guard import Guard
@@ -37,7 +37,7 @@ class Options:
     @property
     def is_local(self) -> bool:
         """Whether only programs of this host reach it."""
-        return self.host in LOCAL_NAMES
+        return is_local(self.host)
 
     def check(self) -> None:
         """Raises UserError for files that cannot be used."""

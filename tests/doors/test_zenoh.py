@@ -17,27 +17,37 @@ from sdrlinkd.config import FleetParams
 from sdrlinkd.fleet import FleetClient
 from sdrlinkd.keyring import new_authority, zenoh_file
 from sdrlinkd.process import Process, module
+from tests.conftest import daemons
 from tests.waiting import wait_for
 
 ROBOT, BASE = 2, 7
 MINE, FORGED = b"\0\1\0\0mine", b"\0\1\0\0forged"
-TLS = "transport/link/tls"
 TEAM, STRANGERS = new_authority(), new_authority()
-# The text of a client's file, or None if it has none.
-FILES = {
-    "no certificate": None,
-    "another team's certificate": zenoh_file(STRANGERS, "desk", 1)
-    .replace("root_ca_certificate_base64", "_")
-    .replace('"_"', '"root_ca_certificate_base64"'),
-    "a certificate that has ended": zenoh_file(TEAM, "desk", -0.5),
-    "a certificate": zenoh_file(TEAM, "desk", 1),
+
+
+def tls_in(file):
+    """The settings of TLS in a file of Zenoh's."""
+    return json.loads(file.split("\n", 1)[1])["transport"]["link"]["tls"]
+
+
+def connecting(file):
+    """Those of them with which it connects."""
+    return {name: value for name, value in tls_in(file).items() if name.startswith("connect")}
+
+
+MEMBERS = zenoh_file(TEAM, "desk", 1)
+STRANGERS_CLIENTS = {
+    "no certificate": {},
+    "another team's certificate": connecting(zenoh_file(STRANGERS, "desk", 1)),
+    "a certificate that has ended": connecting(zenoh_file(TEAM, "desk", -0.5)),
 }
+"""With which settings of TLS each tries; all trust the gateway's certificate."""
 FOR_ALL = [
     ("tls", "no certificate"),
     *(
         pytest.param(protocol, who, marks=pytest.mark.long)
         for protocol in ("tls", "quic")
-        for who in [*FILES][:3]
+        for who in STRANGERS_CLIENTS
         if (protocol, who) != ("tls", "no certificate")
     ),
 ]
@@ -81,37 +91,23 @@ class Base:
 
 
 @pytest.fixture(scope="module")
-def base(tmp_path_factory, request):
-    from tests.conftest import daemons
-
+def base(tmp_path_factory):
     with contextlib.ExitStack() as stack:
         start = stack.enter_context(daemons(tmp_path_factory))
         yield Base(tmp_path_factory.mktemp("door"), start, stack)
 
 
-def put_as(text, endpoint, folder):
-    """Command robot ROBOT as a program with such a file; whether it could connect."""
-    config = zenoh.Config()
-    if text is not None:
-        (folder / "client.json5").write_text(text)
-        config = zenoh.Config.from_file(str(folder / "client.json5"))
-    config = configured(config, mode="client", connect=[endpoint])
-    if text is None:
-        # What a gateway's certificate is signed with is no secret.
-        ours = zenoh.Config.from_file(str(folder / "team.json5"))
-        name = f"{TLS}/root_ca_certificate_base64"
-        config.insert_json5(name, ours.get_json(name))
-        config.insert_json5(f"{TLS}/verify_name_on_connect", "false")
+def put_as_stranger(settings, endpoint):
+    """Command robot ROBOT with these settings of TLS."""
+    config = configured(mode="client", connect=[endpoint])
+    ours = "root_ca_certificate_base64"
+    settings = {ours: tls_in(MEMBERS)[ours], "verify_name_on_connect": False, **settings}
+    config.insert_json5("transport/link/tls", json.dumps(settings))
     config.insert_json5("connect/timeout_ms", "1000")
-    try:
-        session = zenoh.open(config)
-    except zenoh.ZError:
-        return False
-    with session:
+    with contextlib.suppress(zenoh.ZError), zenoh.open(config) as session:
         for _ in range(10):
             session.put(f"sdrlink/mine/robot_{ROBOT}/cmd_vel", FORGED)
             time.sleep(0.05)
-    return True
 
 
 async def commanded_by(params, folder, base):
@@ -129,10 +125,10 @@ async def commanded_by(params, folder, base):
 def test_who_has_no_right_commands_no_robot_and_who_has_it_does(protocol, who, base, tmp_path):
     """Each client in its own way, and then a member of the team: an effect is what counts."""
     endpoint = base.endpoints[protocol]
-    (tmp_path / "team.json5").write_text(FILES["a certificate"])
+    (tmp_path / "team.json5").write_text(MEMBERS)
     params = FleetParams(name="mine", connect=[endpoint], zenoh="team.json5")
     assert asyncio.run(commanded_by(params, tmp_path, base))
-    put_as(FILES[who], endpoint, tmp_path)
+    put_as_stranger(STRANGERS_CLIENTS[who], endpoint)
     assert not base.hears(FORGED, 1.0)
     assert asyncio.run(commanded_by(params, tmp_path, base))
     assert base.gateway.is_running
@@ -146,9 +142,9 @@ def test_a_gateway_does_not_start_at_a_router_that_lets_strangers_command(
     """The router asks nobody for a certificate; what it says of itself is not asked."""
     endpoint = free_endpoint("tls")
     file = tmp_path / "team.json5"
-    file.write_text(FILES["a certificate"])
+    file.write_text(MEMBERS)
     config = router_config(endpoint, file=str(file))
-    config.insert_json5(f"{TLS}/enable_mtls", "false")
+    config.insert_json5("transport/link/tls/enable_mtls", "false")
     if rules is not None:
         may_put = {
             "id": "r", "permission": "allow", "flows": ["ingress", "egress"],
@@ -174,7 +170,7 @@ def test_a_gateway_does_not_start_at_a_router_that_lets_strangers_command(
 def test_a_router_that_asks_for_certificates_is_named_once(start_daemon, tmp_path):
     endpoint = free_endpoint("tls")
     file = tmp_path / "team.json5"
-    file.write_text(FILES["a certificate"])
+    file.write_text(MEMBERS)
     daemon = start_daemon(
         f'[fleet]\nname = "mine"\nconnect = ["{endpoint}"]\nzenoh = "{file}"\ndown = ["*"]\n'
     )

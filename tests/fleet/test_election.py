@@ -150,12 +150,14 @@ def test_what_counts_is_what_is_lost_and_then_the_snr(per, snr_db, is_):
 TICK_S = 0.1
 SCORES = {7: 0.8, 8: 0.97, 9: 0.5}
 FORGERS_GW = 200
-# What may be forged: (gateway, term after that of the gateway that hears it, score).
 FORGED = (
     (FORGERS_GW, 1, 2.0), (FORGERS_GW, TERMS // 2, 2.0), (FORGERS_GW, TERMS // 2 - 1, -1.0),
     (FORGERS_GW, TERMS // 2 + 1, 2.0), (7, 1, 2.0), (8, 1, -1.0), (8, TERMS // 2 - 1, 2.0),
 )  # fmt: skip
-"""A term ahead by one, by as much as there is, by more: then it is behind."""
+"""What may be forged: (gateway, term after that of the gateway that hears it, score).
+
+A term is ahead by one, by as much as there is, or by more: then it is behind.
+"""
 
 
 def term_of(election):
@@ -225,7 +227,10 @@ def heals(elections, now):
     ],
 )  # fmt: skip
 def test_in_every_state_that_faults_lead_to_the_election_heals(faults, ticks):
-    """All orders of three gateways, all places of up to so many claims lost or forged."""
+    """All places of up to so many claims lost or forged; every fourth tick, in all orders.
+
+    Each robot has an election of its own, so one robot is enough.
+    """
     start = {gw: Election(gw, LEASE_S, 0.0) for gw in SCORES}
     states, known, healed = {seen(start, 0.0): (start, 0)}, set(), 0
     for tick in range(ticks):

@@ -381,8 +381,12 @@ NAMED = {"cert_common_names": ["desk"]}
         (rules_for(NAMED), ""), (rules_for({"usernames": ["ann"]}), ""),
         (rules_for({}, "sdrlink/fleet/@gw/**"), ""), (rules_for({}, "sdrlink/other/**"), ""),
         (rules_for({}, messages=["declare_subscriber"]), ""),
+        (rules_for({}, "42/**", messages=["declare_subscriber"]), ""),
+        (rules_for({}, "42/robot_2/**"), "lets subject 's' command at 42/"),
+        (rules_for({}, "42/**", messages=["query"]), "lets subject 's' command at 42/"),
+        (rules_for({}, "sdrlink/**", messages=["query"]), ""),
         (rules_for(NAMED, default="allow"), "has default_permission 'allow'; allowed: \"deny\""),
-        (rules_for({}), "lets subject 's' put at sdrlink/fleet/robot_"),
+        (rules_for({}), "lets subject 's' command at sdrlink/fleet/robot_"),
         (rules_for({"interfaces": ["eth0"]}, "**"), "who may be anybody; allowed: subjects with"),
         (rules_for({"zids": ["ab"]}, "sdrlink/fleet/robot_2/cmd_vel"), "who may be anybody"),
         (rules_for({"link_protocols": ["tls"]}, "sdrlink/*/robot_2/**"), "who may be anybody"),
@@ -394,7 +398,7 @@ NAMED = {"cert_common_names": ["desk"]}
 )  # fmt: skip
 def test_rules_of_access_control_are_read(rules, fault, tmp_path):
     (tmp_path / "acl.json5").write_text(json.dumps({"access_control": rules}))
-    params = FleetParams(down=["cmd_vel"], listen=["tcp/a:1"], zenoh="acl.json5")
+    params = FleetParams(down=["cmd_vel"], listen=["tcp/a:1"], zenoh="acl.json5", ros_domain=42)
     if not fault:
         make_zenoh_config(params, tmp_path)
         return

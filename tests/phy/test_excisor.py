@@ -345,20 +345,25 @@ def test_what_was_cut_is_known_by_subcarrier(rng):
     assert excisor.cuts.kept(np.array([90_000]), 0.0, GRID) is None
 
 
+def heard_knowing(x, engine):
+    """How many PDUs are heard by a receiver that knows what was cut, and by one that does not."""
+    kind, n_heard = reference.Receiver if engine == "reference" else in_use().receiver, []
+    for knows in (True, False):
+        receiver, excisor = kind(), Excisor()
+        receiver.cuts = excisor.cuts if knows else None
+        n_heard.append(len(heard(receiver.push(excisor.push(x)) + receiver.flush())))
+    return n_heard
+
+
 @pytest.mark.parametrize("engine", ["in use", "reference"])
 def test_64qam_is_read_around_lines(rng, engine):
     """Without the knowledge of what was cut, most of these are lost."""
     _, x = a_stream(rng, 20, 220, 7, 25)
     for offset_hz in (-271e3, 83e3, 207e3):
         x = Jammer("tone", 5, RATE_HZ, 1, offset_hz=offset_hz).add(x, 0)
-    x = np.concatenate((x[:SETTLED], x))
-    kind, n_heard = reference.Receiver if engine == "reference" else in_use().receiver, []
-    for knows in (True, False):
-        receiver, excisor = kind(), Excisor()
-        receiver.cuts = excisor.cuts if knows else None
-        n_heard.append(len(heard(receiver.push(excisor.push(x)) + receiver.flush())))
-    assert n_heard[0] >= 10
-    assert n_heard[1] <= 5
+    knowing, without = heard_knowing(np.concatenate((x[:SETTLED], x)), engine)
+    assert knowing >= 10
+    assert without <= 5
 
 
 @pytest.mark.parametrize("engine", ["in use", "reference"])
@@ -366,13 +371,9 @@ def test_64qam_is_read_around_pulses(rng, engine):
     """Without the knowledge of what was blanked, most of these are lost."""
     _, x = a_stream(rng, 20, 220, 5, 28)
     x = jammed(rng, x, "pulses", 17, period_s=3e-4, duty=0.05)
-    kind, n_heard = reference.Receiver if engine == "reference" else in_use().receiver, []
-    for knows in (True, False):
-        receiver, excisor = kind(), Excisor()
-        receiver.cuts = excisor.cuts if knows else None
-        n_heard.append(len(heard(receiver.push(excisor.push(x)) + receiver.flush())))
-    assert n_heard[0] >= 13
-    assert n_heard[1] <= 7
+    knowing, without = heard_knowing(x, engine)
+    assert knowing >= 13
+    assert without <= 7
 
 
 def test_the_snr_that_is_told_of_pdus_beside_pulses_does_not_depend_on_their_mcs(rng):

@@ -157,6 +157,18 @@ def test_a_call_whose_bridge_restarts_is_not_executed_again():
     assert world.ended[call].status == Status.RESTARTED
 
 
+def test_what_may_have_been_forgotten_is_not_executed_again():
+    """An hour later, somebody plays a call that was executed, with the age that it has then."""
+    answerer, asked = Answerer(0.0, Random(1)), Packet(Kind.REQUEST, 7, 1, "/set")
+    key = answerer.hear(2, asked, 0.1, 1000.0)
+    answerer.answer(key, Status.OK, b"", 1000.0)
+    for now in range(1000, 1200):
+        answerer.due(float(now))
+    for age_s in (121.0, 3600.0):
+        assert answerer.hear(2, asked, age_s, 1000.0 + age_s) is None
+        assert answerer.due(1000.0 + age_s)[-1].packet.status == Status.RESTARTED
+
+
 def test_an_answer_that_is_too_large_is_told():
     answerer = Answerer(0.0, Random(1))
     key = answerer.hear(2, Packet(Kind.REQUEST, 7, 1, "/set"), 0.0, 10.0)
