@@ -40,8 +40,8 @@ WORDS: dict[int, str] = {
     Status.NO_SERVER: "no server offers it there, or services.allow does not name it",
     Status.SERVER_ENDED: "its server ended during the call",
     Status.OTHER_TYPE: "its type has other fields there; install the same version at both robots",
-    Status.RESTARTED: "the bridge there has restarted since, or the call is too old to be remembered; "
-    "it may or may not have been executed",
+    Status.RESTARTED: "the bridge there has restarted since, or the call is very old; it may "
+    "or may not have been executed",
     Status.BUSY: f"{MOST_KEPT} calls are running there",
     Status.TOO_LARGE: "its request or its answer is too large for the link",
     Status.TIMED_OUT: "no answer came in time",
