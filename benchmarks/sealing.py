@@ -35,6 +35,8 @@ from sdrlinkd.wire import (
 SIZES = (64, 256, 1024)
 TAG_SIZE = 8
 KEY = Key(0, bytes(range(32)))
+NEW = Remembered({KEY.fingerprint: 0})
+"""What is on disk of a key that was never used."""
 A_TICK = 1 / 32
 PDUS_PER_TICK = 200
 PDUS_PER_S = 1000
@@ -146,7 +148,7 @@ def _inner(size: int, seq: int, chance: Random) -> bytes:
 
 
 def _sealing(own_id: int, size: int) -> Sealing:
-    made = Sealing(own_id, size, SecurityParams(mode="seal"), [KEY], Remembered(), _draw)
+    made = Sealing(own_id, size, SecurityParams(mode="seal"), [KEY], NEW, _draw)
     _remember(made, 0.0)
     return made
 

@@ -4,14 +4,19 @@ import asyncio
 import contextlib
 import logging
 import os
+import time
 from collections.abc import Callable, Sequence
+from math import inf
 from pathlib import Path
 
 from sdrlinkd.config import Setup
 from sdrlinkd.errors import UserError
-from sdrlinkd.keyring import KeyState, load_keys, state_dir
+from sdrlinkd.kernelclock import is_synchronized
+from sdrlinkd.keyring import KeyState, load_keys, machine_tag, state_dir
 from sdrlinkd.sealing import Key, Remembered, Sealing
 
+AGES_S = 5.0
+"""Time in s between two looks at the host's clock."""
 log = logging.getLogger("sdrlinkd")
 
 
@@ -29,6 +34,12 @@ class Keeping:
         self._keys = list(keys)
         self._read = read
         self._writing: asyncio.Task[None] | None = None
+        self._aged_at = -inf
+        if sealing.is_lost:
+            log.warning(
+                "the numbers of the key are lost here: nothing is sealed before it is known which "
+                "ones were used"
+            )
         wanted = sealing.memory.wanted(0.0)
         if wanted is None:
             return
@@ -42,6 +53,9 @@ class Keeping:
 
     def look(self, now: float, *, at_once: bool) -> None:
         """Write what is due at `now`: in a thread, or `at_once`, where time waits for us."""
+        if not at_once and now >= self._aged_at + AGES_S:
+            self._aged_at = now
+            self._tell_ages(now)
         if self._writing is not None and not self._writing.done():
             return
         wanted = self.sealing.memory.wanted(now)
@@ -55,7 +69,7 @@ class Keeping:
     def reload(self) -> str:
         """Take the keys of the file from now on; returns what changed. Raises UserError."""
         keys = self._read()
-        if keys == self._keys:
+        if keys == self._keys and not self.sealing.is_lost:
             return ""
         loaded = self._state.load(keys)
         self.sealing.install(usable(keys, loaded), loaded)
@@ -68,6 +82,14 @@ class Keeping:
         with contextlib.suppress(OSError):
             self._state.save(self.sealing.memory.at_stop())
         self._state.close()
+
+    def _tell_ages(self, now: float) -> None:
+        """Tell how old the keys are, as long as this host's clock is synchronized."""
+        host_s = 1e-9 * time.time_ns()
+        ages_s = {
+            key.fingerprint: host_s - key.made_s for key in self._keys if key.made_s is not None
+        }
+        self.sealing.tell_ages(ages_s if is_synchronized() else {}, now)
 
     async def _write(self, wanted: Remembered) -> None:
         self._note(wanted, await asyncio.to_thread(self._problem, wanted))
@@ -107,7 +129,7 @@ def open_keeping(setup: Setup) -> Keeping | None:
         sealing = Sealing(
             setup.node_id, setup.config.link.pdu_size, security, usable(keys, remembered),
             remembered, os.urandom,
-            hears_self=setup.config.hears_self,
+            hears_self=setup.config.hears_self, machine=machine_tag(),
         )  # fmt: skip
         return Keeping(sealing, state, keys, lambda: load_keys(path))
     except UserError:

@@ -26,6 +26,8 @@ MCS = 3
 SNR_DB = 25.0
 CDR = b"\0\1\0\0"
 KEY = Key(0, bytes(range(32)))
+NEW = Remembered({KEY.fingerprint: 0})
+"""What is on disk of a key that was never used."""
 REMEMBER_S = 0.1
 """Time in s between two times that a robot's disk takes what its sealing must remember."""
 _NUMBER = struct.Struct("<I")
@@ -113,7 +115,12 @@ def drive(flows: Sequence[Flow], until_s: float, seed: int, air: Air = FULL_DUPL
     config = setups[SENDER].config
     sealing = {
         node: Sealing(
-            node, config.link.pdu_size, config.security, [KEY], Remembered(), rng.randbytes
+            node,
+            config.link.pdu_size,
+            config.security,
+            [KEY],
+            NEW,
+            rng.randbytes,
         )
         for node in robots
         if air.is_sealed

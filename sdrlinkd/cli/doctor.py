@@ -13,8 +13,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from sdrlinkd.cli.app import AsJson, RuntimeDir, app
+from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
+from sdrlinkd.client import NoDaemonError
 from sdrlinkd.client import runtime_dir as chosen_dir
+from sdrlinkd.errors import UserError
 
 if TYPE_CHECKING:
     from sdrlinkd.config import Setup
@@ -58,12 +60,14 @@ def doctor(
 def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Finding"], "HostTerm"]:
     from sdrlinkd import doctor as checks
     from sdrlinkd.config import Config, backend_of
+    from sdrlinkd.kernelclock import kernel_clock
 
     config = setup.config if setup is not None else Config()
     radio = backend_of(config)
     device = config.soapy.device if config.backend == "soapy" else ""
     # Read the load before our own checks add to it.
-    load, stat, wall, monotonic = os.getloadavg()[0], _stat(), time.time_ns(), time.monotonic_ns()
+    load, stat = os.getloadavg()[0], _text("proc/stat")
+    wall, monotonic = time.time_ns(), time.monotonic_ns()
     headroom = []
     if radio is not None or setup is None:
         headroom = [checks.headroom_found(config.modem, config.link.pdu_size, MODEM_S)]
@@ -72,12 +76,13 @@ def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Findin
     given = runtime_dir or config.bus.runtime_dir or os.environ.get("RUNTIME_DIRECTORY") or None
     found = [
         *checks.check_machine(
-            os.cpu_count() or 1, load, (stat, _stat()), ROOT / "sys/devices/system/cpu",
+            os.cpu_count() or 1, load, (stat, _text("proc/stat")), ROOT / "sys/devices/system/cpu",
             is_timed=radio is not None and radio.is_timed,
         ),
         *_environment(),
+        checks.check_machine_id(_text("etc/machine-id"), _copies(runtime_dir)),
         *checks.check_directory(chosen_dir(given), os.getuid()),
-        *checks.check_clock(checks.kernel_clock(), step_s, config.chrony.socket),
+        *checks.check_clock(kernel_clock(), step_s, config.chrony.socket),
         *checks.check_limits(checks.granted(), device, ROOT),
         *headroom,
         checks.check_host(host, config.soapy.lead_s if device else None),
@@ -120,11 +125,22 @@ def _environment() -> list["Finding"]:
     return check_environment(requirements, metadata.version, home, phy_home, engine.fitting())
 
 
-def _stat() -> str:
+def _text(path: str) -> str:
     try:
-        return (ROOT / "proc/stat").read_text()
+        return (ROOT / path).read_text().strip()
     except OSError:
         return ""
+
+
+def _copies(runtime_dir: Path | None) -> list[int] | None:
+    """Robots with this machine's id, as a running daemon has heard them; None: none runs."""
+    from sdrlinkd.asking import ask_status
+
+    try:
+        with connect(runtime_dir) as control:
+            return ask_status(control).link.security.copies
+    except (NoDaemonError, UserError):
+        return None
 
 
 def _print(found: list["Finding"]) -> None:

@@ -237,7 +237,7 @@ def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None, hub: s
         lines.append(f"  sdrlink-ether {where} &")
     here = configs[: None if is_here else 1]
     if KEYS in files:
-        lines += [f"  sdrlinkctl key install --config {each}" for each in here]
+        lines += [f"  sdrlinkctl key install --new --config {each}" for each in here]
     behind = " &" if is_here else ""
     lines += [f"  sdrlinkd --config {each}{behind}" for each in here]
     if len(configs) > 1 and not is_here:

@@ -68,6 +68,9 @@ def install(
         typer.Argument(help="File with the key; -: stdin; absent: the robot's own key file."),
     ] = None,
     config: ConfigFile = DEFAULT_CONFIG,
+    new: Annotated[
+        bool, typer.Option("--new", help="This robot's id has never sealed with it, on any disk.")
+    ] = False,
     replace: Annotated[
         bool, typer.Option("--replace", help="Use the new key in place of all others, at once.")
     ] = False,
@@ -90,10 +93,16 @@ def install(
     installed = _held(path) if copy and path.exists() else None
     keys = given if replace or installed is None else _merged(installed, given, state, path)
     check_number(keys, str(path))
-    begun = [_begun(key, state, setup.node_id, owner) for key in keys.key]
+    if new:
+        _check_new(keys, state, setup.node_id)
+    is_new = new or state.is_whole
+    begun = [_begun(key, state, setup.node_id, owner, is_new) for key in keys.key]
     if copy:
         write_key_file(path, structs.replace(keys, key=begun), owner)
     _say(*(f"installed: {_told(key)}" for key in given.key))
+    lost = [key.kid for key in keys.key if not state.knows(key.key)]
+    if lost:
+        _say(_about_lost(lost))
     if setup.config.security.mode == "off":
         _say(f'nothing is sealed yet: set mode = "seal" in [security] of {config}, at all robots')
         return
@@ -243,17 +252,37 @@ def _merged(installed: "KeyFile", given: "KeyFile", state: "KeyState", path: Pat
     )
 
 
+def _check_new(keys: "KeyFile", state: "KeyState", robot: int) -> None:
+    """Check that a key file does not tell that the robot used a key. Raises UserError."""
+    for key in keys.key:
+        if robot in key.robots and not state.knows(key.key):
+            raise UserError(
+                f"--new: robot {robot} has used key {key.kid}, and its numbers in "
+                f"{state.directory} are lost; allowed: install it without --new, or make the next "
+                "key: sdrlinkctl key rotate"
+            )
+
+
 def _begun(
-    key: "StoredKey", state: "KeyState", robot: int, owner: tuple[int, int] | None
+    key: "StoredKey",
+    state: "KeyState",
+    robot: int,
+    owner: tuple[int, int] | None,
+    is_new: bool,
 ) -> "StoredKey":
-    """The key, whose numbers begin on this robot if they have not begun. Raises UserError."""
-    if state.install(key.key, owner) and robot in key.robots:
-        state.forget(key.key)
-        raise UserError(
-            f"{state.directory}: the numbers of key {key.kid} were here and are lost; a number "
-            "must never be used twice, so make the next key: sdrlinkctl key rotate"
-        )
+    """The key, whose numbers begin on this robot if it is new here."""
+    if is_new and robot not in key.robots and not state.knows(key.key):
+        state.begin(key.key, owner)
     return structs.replace(key, robots=sorted({*key.robots, robot}))
+
+
+def _about_lost(kids: list[int]) -> str:
+    which = f"key {kids[0]}" if len(kids) == 1 else f"keys {kids[0]} and {kids[1]}"
+    return (
+        f"the numbers of {which} are not here, so this robot may have used any: before it seals, "
+        "the daemon finds out from its clock and from the other robots. If its id never sealed "
+        "with the key, say --new"
+    )
 
 
 def _owner(directory: Path) -> tuple[int, int] | None:
@@ -293,7 +322,7 @@ def _reloaded(setup: "Setup") -> str:
 def _told(key: "StoredKey") -> str:
     from sdrlinkd.keyring import words_of
 
-    made = f", made {key.created}" if key.created else ""
+    made = f", made {key.made_on}" if key.created else ""
     return f"key {key.kid}{made}: {words_of(key.fingerprint)}"
 
 

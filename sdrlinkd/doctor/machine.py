@@ -34,6 +34,23 @@ def check_machine(
     ]  # fmt: skip
 
 
+def check_machine_id(machine_id: str, copies: list[int] | None) -> Finding:
+    """A finding on whether this computer can be told from others, as sealing needs.
+
+    `copies` are robots on other computers with the same id, as a running daemon has heard them;
+    None: no daemon runs.
+    """
+    what = "machine id"
+    renewed = "sudo rm /etc/machine-id && sudo systemd-machine-id-setup, then restart the computer"
+    if copies:
+        robots = " and ".join(f"robot {src}" for src in copies)
+        return bad(what, f"that of {robots}, too: one disk is a copy of the other", renewed)
+    if not machine_id or machine_id == "uninitialized":
+        return none(what, "none: nobody can tell a copy of this disk from this computer")
+    heard = "" if copies is None else ", not heard of any other robot"
+    return good(what, f"{machine_id[:8]}…{heard}")
+
+
 def _stolen(before: str, after: str) -> Finding:
     first, last = _times(before), _times(after)
     spent = [late - early for early, late in zip(first, last, strict=False)]

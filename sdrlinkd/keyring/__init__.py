@@ -18,7 +18,7 @@ from sdrlinkd.keyring.files import (
     write_key_file,
 )
 from sdrlinkd.keyring.making import new_key
-from sdrlinkd.keyring.state import KeyState, state_dir
+from sdrlinkd.keyring.state import KeyState, machine_tag, state_dir
 from sdrlinkd.keyring.words import words_of
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "create_key_file",
     "key_file_text",
     "load_keys",
+    "machine_tag",
     "make_certificates",
     "new_authority",
     "new_key",

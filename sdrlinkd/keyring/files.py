@@ -1,5 +1,7 @@
 """Key files: TOML, for their owner alone."""
 
+import contextlib
+import datetime
 import os
 import stat
 import tempfile
@@ -33,14 +35,26 @@ class StoredKey(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     secret: bytes
     """The key itself: 32 octets in base64."""
     created: str = ""
-    """Day on which it was made."""
+    """When it was made: a time in UTC, or a day alone if the clock was not synchronized."""
     robots: list[RobotId] = []
     """Robots whose numbers were begun with this file."""
 
     @property
     def key(self) -> Key:
         """The key without what people know about it."""
-        return Key(self.kid, self.secret)
+        return Key(self.kid, self.secret, made_s=self.made_s)
+
+    @property
+    def made_s(self) -> float | None:
+        """When it was made, in s since 1970; None if it is not known well enough."""
+        if "T" not in self.created:
+            return None
+        return datetime.datetime.fromisoformat(self.created).timestamp()
+
+    @property
+    def made_on(self) -> str:
+        """The day on which it was made, for people."""
+        return self.created[:10]
 
     @property
     def fingerprint(self) -> bytes:
@@ -77,6 +91,7 @@ def load_keys(path: Path) -> list[Key]:
             each.kid,
             each.secret,
             {frozenset(pair.robots): pair.secret for pair in read.pair if pair.kid == each.kid},
+            each.made_s,
         )
         for each in read.key
     ]
@@ -169,6 +184,11 @@ def read_key_file(path: Path) -> KeyFile:
 def _check(path: str, read: KeyFile) -> None:
     if not read.key:
         raise UserError(f"{path}: no key in it; allowed: what sdrlinkctl key generate writes")
+    for key in read.key:
+        if not _is_time(key.created):
+            raise UserError(
+                f"{path}: created = {key.created!r}; allowed: a time such as 2026-11-25T14:02:11Z"
+            )
     kids = [each.kid for each in read.key]
     for kid in kids:
         if kids.count(kid) > 1:
@@ -187,3 +207,12 @@ def _check(path: str, read: KeyFile) -> None:
                 f"{path}: pair {sorted(robots)} with kid {kid}; allowed: two robots, once for each "
                 "kid of a key"
             )
+
+
+def _is_time(text: str) -> bool:
+    """Whether a text is empty, a day, or a time in a known zone."""
+    if not text:
+        return True
+    with contextlib.suppress(ValueError):
+        return "T" not in text or datetime.datetime.fromisoformat(text).tzinfo is not None
+    return False

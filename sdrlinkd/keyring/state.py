@@ -11,29 +11,46 @@ import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Self
+from typing import Annotated, Self
 
 import msgspec
+from msgspec import Meta, structs
 
 from sdrlinkd.errors import UserError
+from sdrlinkd.keyring.files import RobotId
 from sdrlinkd.sealing import Key, Remembered
 from sdrlinkd.wire import N_TICKS, TICKS_PER_S
 
 MACHINE_ID = Path("/etc/machine-id")
+BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 SYSTEM_CONFIG, SYSTEM_STATE = Path("/etc/sdrlinkd"), Path("/var/lib")
 OTHER_MACHINE_S = 3600
 """Key time in s that is skipped when a state comes from another machine."""
 
 
-class _OfKey(msgspec.Struct, frozen=True, kw_only=True):
-    """The file of one key: its floor in 1/32 s, and the newest T of each robot."""
+Ticks = Annotated[int, Meta(ge=0, le=N_TICKS)]
 
+
+class _OfKey(msgspec.Struct, frozen=True, kw_only=True):
+    """The file of one key: its floor in 1/32 s, and the newest T of each robot.
+
+    `check` is the checksum of the rest; empty: written by a version without it. `is_whole`: all
+    numbers ever used are accounted for, as the key was new when the file began.
+    """
+
+    check: str = ""
     fingerprint: str
     machine: str
-    floor: int
+    floor: Ticks
     in_use: bool = False
     retired: bool = False
-    newest: dict[int, int] = {}
+    is_whole: bool = True
+    newest: dict[RobotId, Ticks] = {}
+
+    def checksum(self) -> str:
+        """The checksum of all but itself."""
+        told = msgspec.json.encode(structs.replace(self, check=""))
+        return hashlib.sha256(told).hexdigest()[:16]
 
 
 class KeyState:
@@ -44,6 +61,8 @@ class KeyState:
         self._robot_id = robot_id
         self._lock: int | None = None
         self._written: dict[bytes, _OfKey] = {}
+        self._whole: set[bytes] = set()
+        """Fingerprints of the keys all of whose numbers are accounted for."""
         self.moved: list[bytes] = []
         """Fingerprints of keys whose state came from another machine."""
 
@@ -71,22 +90,23 @@ class KeyState:
             self._lock = None
 
     def load(self, keys: Sequence[Key]) -> Remembered:
-        """What is on disk about `keys`, all of which must be installed here. Raises UserError."""
+        """What is on disk about `keys`; the numbers of a key without a file are lost.
+
+        A file that is damaged counts as none. Raises UserError if one cannot be read.
+        """
         floors, newest, in_use, retired = {}, {}, b"", set()
         machine = machine_hash()
         for key in keys:
             state = self._read(key.fingerprint)
             if state is None:
-                raise UserError(
-                    f"{self.directory}: no numbers of key {key.kid}. If it was never installed on "
-                    "this robot: sdrlinkctl key install. If they are lost: sdrlinkctl key rotate, "
-                    "as a number must never be used twice"
-                )
+                continue
             floor = state.floor
             if state.machine != machine:
                 self.moved.append(key.fingerprint)
                 floor = min(floor + OTHER_MACHINE_S * TICKS_PER_S, N_TICKS)
             floors[key.fingerprint] = floor
+            if state.is_whole:
+                self._whole.add(key.fingerprint)
             newest[key.fingerprint] = state.newest
             if state.in_use:
                 in_use = key.fingerprint
@@ -104,26 +124,30 @@ class KeyState:
                 floor=floor,
                 in_use=fingerprint == remembered.in_use,
                 retired=fingerprint in remembered.retired,
+                is_whole=fingerprint in self._whole,
                 newest=dict(remembered.newest.get(fingerprint, {})),
             )
             if self._written.get(fingerprint) != state:
                 self._write(state)
                 self._written[fingerprint] = state
 
-    def install(self, key: Key, owner: tuple[int, int] | None) -> bool:
-        """Begin the state of a new key; False if it was there already. Raises UserError."""
-        if self._read(key.fingerprint) is not None:
-            return False
+    def knows(self, key: Key) -> bool:
+        """Whether the numbers of a key are here. Raises UserError."""
+        return self._read(key.fingerprint) is not None
+
+    def begin(self, key: Key, owner: tuple[int, int] | None) -> None:
+        """Begin the numbers of a key that was never used on this robot. Raises UserError."""
         state = _OfKey(fingerprint=key.fingerprint.hex(), machine=machine_hash(), floor=0)
         try:
             self._write(state, owner)
         except OSError as error:
             raise UserError(self._unusable(error)) from None
-        return True
 
-    def forget(self, key: Key) -> None:
-        """Remove the state of a key that was just begun."""
-        self._path(key.fingerprint.hex()).unlink(missing_ok=True)
+    @property
+    def is_whole(self) -> bool:
+        """Whether this directory has been kept since a key was new. Raises UserError."""
+        paths = self.directory.glob(f"robot-{self._robot_id}-key-*.json")
+        return any(state is not None and state.is_whole for state in map(self._read_at, paths))
 
     def check(self) -> None:
         """Check that the directory can be written. Raises UserError."""
@@ -138,8 +162,9 @@ class KeyState:
         """All robots of which a sealed PDU was opened, with whatever key."""
         found: set[int] = set()
         for path in self.directory.glob(f"robot-{self._robot_id}-key-*.json"):
-            with contextlib.suppress(OSError, msgspec.MsgspecError, ValueError):
-                found |= msgspec.json.decode(path.read_bytes(), type=_OfKey).newest.keys()
+            with contextlib.suppress(UserError):
+                state = self._read_at(path)
+                found |= state.newest.keys() if state is not None else set()
         return frozenset(found)
 
     def _unusable(self, error: OSError) -> str:
@@ -152,28 +177,28 @@ class KeyState:
         return self.directory / f"robot-{self._robot_id}-key-{fingerprint[:16]}.json"
 
     def _read(self, fingerprint: bytes) -> _OfKey | None:
-        path = self._path(fingerprint.hex())
+        state = self._read_at(self._path(fingerprint.hex()))
+        return None if state is None or state.fingerprint != fingerprint.hex() else state
+
+    def _read_at(self, path: Path) -> _OfKey | None:
+        """A key's file; None if it is not there, or damaged. Raises UserError."""
         try:
             state = msgspec.json.decode(path.read_bytes(), type=_OfKey)
         except FileNotFoundError:
             return None
         except OSError as error:
             raise UserError(f"{path} cannot be read ({error.strerror})") from None
-        except (msgspec.MsgspecError, ValueError) as error:
-            raise UserError(
-                f"{path} is damaged ({error}); without its numbers the key must not be used: make "
-                "the next one with sdrlinkctl key rotate"
-            ) from None
-        if state.fingerprint != fingerprint.hex() or not 0 <= state.floor <= N_TICKS:
-            raise UserError(f"{path} is not the state of this key; make the next one instead")
-        return state
+        except (msgspec.MsgspecError, ValueError):
+            return None
+        return state if state.check in ("", state.checksum()) else None
 
     def _write(self, state: _OfKey, owner: tuple[int, int] | None = None) -> None:
         path = self._path(state.fingerprint)
         handle, name = tempfile.mkstemp(dir=self.directory, prefix=".state-")
         try:
             with os.fdopen(handle, "wb") as file:
-                file.write(msgspec.json.encode(state) + b"\n")
+                told = structs.replace(state, check=state.checksum())
+                file.write(msgspec.json.encode(told) + b"\n")
                 if owner is not None:
                     os.fchown(file.fileno(), *owner)
                 file.flush()
@@ -209,8 +234,24 @@ def state_dir(given: str, config_path: Path | None) -> Path:
 
 def machine_hash() -> str:
     """What tells this machine from others; empty if it has no id."""
-    try:
-        own = MACHINE_ID.read_bytes().strip()
-    except OSError:
-        return ""
+    own = _octets(MACHINE_ID)
     return hashlib.sha256(b"sdrlinkd" + own).hexdigest()[:16] if own else ""
+
+
+def machine_tag() -> bytes:
+    """What others may know of this machine: three octets of its id, and one of its last start.
+
+    Empty if it has no id. Two machines with the same id differ in the last octet, mostly.
+    """
+    own, boot = _octets(MACHINE_ID), _octets(BOOT_ID)
+    if not (own and boot):
+        return b""
+    by_id = hashlib.sha256(b"sdrlinkd machine" + own).digest()
+    return by_id[:3] + hashlib.sha256(b"sdrlinkd start" + boot).digest()[:1]
+
+
+def _octets(path: Path) -> bytes:
+    try:
+        return path.read_bytes().strip()
+    except OSError:
+        return b""

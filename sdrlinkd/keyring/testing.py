@@ -2,7 +2,7 @@
 
 from types import ModuleType
 
-from sdrlinkd.keyring import state
+from sdrlinkd.keyring import making, state
 
 __all__ = [
     "CONSTANTS",
@@ -10,5 +10,7 @@ __all__ = [
 
 CONSTANTS: dict[str, tuple[ModuleType, str]] = {
     "machine_id": (state, "MACHINE_ID"),
+    "boot_id": (state, "BOOT_ID"),
+    "is_synchronized": (making, "is_synchronized"),
 }
-"""Constants that tests replace: `monkeypatch.setattr(*CONSTANTS["machine_id"], path)`."""
+"""What tests replace: `monkeypatch.setattr(*CONSTANTS["machine_id"], path)`."""

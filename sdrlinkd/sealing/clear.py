@@ -5,9 +5,9 @@ from math import inf
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.reports import SecurityReport
-from sdrlinkd.sealing.opener import Opened, clear_key_in
+from sdrlinkd.sealing.opener import Opened, told_in_clear
 from sdrlinkd.sealing.strangers import Strangers
-from sdrlinkd.wire import Contact, KeyTold, parse_sealed, postponed
+from sdrlinkd.wire import Contact, FoundNumbers, KeyTold, LostNumbers, parse_sealed, postponed
 
 
 class ClearOpener:
@@ -34,18 +34,18 @@ class ClearOpener:
 
     def refuses_clear(self, data: bytes, now: float) -> bool:
         """Whether a PDU in the clear is refused: never; a KEY record in it is noted."""
-        key = clear_key_in(data, self._pdu_size)
-        if key is not None:
-            self.strangers.tells(data[1], key, now)
+        told = told_in_clear(data, self._pdu_size)
+        if isinstance(told, KeyTold):
+            self.strangers.tells(data[1], told, now)
         return False
 
 
 class InTheClear:
     """Leaves PDUs as they are. Its methods are those of `Sealing`."""
 
-    is_on = False
+    is_on = is_lost = False
     halted = ""
-    contact_due_at = key_due_at = inf
+    contact_due_at = clear_due_at = inf
 
     def __init__(self, pdu_size: int, has_control: bool) -> None:
         self.inner_size = pdu_size
@@ -81,9 +81,13 @@ class InTheClear:
     def further_key(self) -> KeyTold | None:
         """The KEY record of a key to which this robot can change: none."""
 
-    def clear_key(self, now: float) -> KeyTold:
-        """No KEY record is ever due. Raises ValueError."""
+    def told_in_clear(self, now: float) -> KeyTold | LostNumbers:
+        """No record is ever due. Raises ValueError."""
         raise ValueError(f"a KEY record at {now} s, without a key")
+
+    def found(self, now: float) -> list[FoundNumbers]:  # noqa: ARG002  # as in Sealing
+        """There is nothing to tell about the numbers of others."""
+        return []
 
     def look(self, now: float) -> None:
         """There are no keys to change."""

@@ -25,10 +25,14 @@ _MOST = (0xFF - CONTACT_OVERHEAD + TLV_HEADER_SIZE) // MET_SIZE
 
 
 class Contacts:
-    """Makes our CONTACT records; `number` is drawn at random at each start."""
+    """Makes our CONTACT records; `number` is drawn at random at each start.
 
-    def __init__(self, number: bytes) -> None:
-        self.number = number
+    Its last octets tell whose machine it is (`machine`), if that is known.
+    """
+
+    def __init__(self, number: bytes, machine: bytes = b"") -> None:
+        self.number = number[: len(number) - len(machine)] + machine
+        self._machine = machine
         self.due_at = 0.0
         """When the next CONTACT is due, in s."""
         self._period_s = PATIENCE_S
@@ -39,6 +43,13 @@ class Contacts:
     def prefix(self) -> bytes:
         """What others repeat of our number."""
         return self.number[:CONTACT_PREFIX_SIZE]
+
+    def is_copy(self, number: bytes | None) -> bool:
+        """Whether the robot with `number` has our machine's id, and runs on another machine."""
+        if not self._machine or number is None:
+            return False
+        other = number[-len(self._machine) :]
+        return other != self._machine and other[:-1] == self._machine[:-1]
 
     def met_somebody(self, now: float) -> None:
         """Say it soon and often again, as a robot is heard that is new, or not proven any more."""

@@ -16,6 +16,8 @@ class Key:
     kid: int
     secret: bytes
     pairs: Mapping[frozenset[int], bytes] = field(default_factory=dict, hash=False)
+    made_s: float | None = field(default=None, compare=False)
+    """When it was made, in s since 1970 by a clock that was synchronized; None: not known."""
 
     @property
     def fingerprint(self) -> bytes:

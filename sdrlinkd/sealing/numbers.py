@@ -18,12 +18,14 @@ REMEMBERED_TICKS = 10 * TICKS_PER_S
 class Numbers:
     """Gives out the numbers (T, seq), and says which floor must be on disk.
 
-    `floor` is what was on disk; 0: the key is new. No T may be used before `move_floor` tells a
-    floor above it that is on disk.
+    `floor` is what was on disk; 0: the key is new; None: that is lost, and there are no numbers
+    before `resume`. No T may be used before `move_floor` tells a floor above it that is on disk.
     """
 
-    def __init__(self, floor: int) -> None:
-        begin = min(floor + round(LEAP_S * TICKS_PER_S), N_TICKS) if floor else 0
+    def __init__(self, floor: int | None) -> None:
+        self.is_lost = floor is None
+        """Whether it is not known which numbers were used before."""
+        begin = _leap(floor) if floor else 0
         self._begin = begin
         self._zero: float | None = None
         self.floor = begin
@@ -55,31 +57,38 @@ class Numbers:
         if self._zero is not None:
             self._begin, self._zero, self._then = self.newest + 1, None, -inf
 
-    def change_key(self, floor: int) -> None:
-        """Seal with another key from now on, of which `floor` is on disk; 0: it is new.
+    def change_key(self, floor: int | None) -> None:
+        """Seal with another key from now on, of which `floor` is on disk, as at the start.
 
         T goes on, so that others notice nothing, as long as that leaves the key half of its life.
         No number is given out before `move_floor`.
         """
-        if floor > self.newest or self.newest >= N_TICKS // 2:
-            leap = round(LEAP_S * TICKS_PER_S) if floor else 0
-            self._begin, self._zero = min(floor + leap, N_TICKS), None
-            self.first = self.newest = self._begin
-            self._used.clear()
-            self._last = [-1] * N_SEQS
+        was_lost, self.is_lost = self.is_lost, floor is None
+        if floor is None:
+            return
+        if was_lost or floor > self.newest or self.newest >= N_TICKS // 2:
+            self._begin_at(_leap(floor) if floor else 0)
         self._then = -inf
+        self.floor = self._end = self.newest
+
+    def resume(self, floor: int) -> None:
+        """Go on above `floor`, as the numbers were lost; none is given out before `move_floor`."""
+        self.is_lost = False
+        self._begin_at(_leap(floor))
         self.floor = self._end = self.newest
 
     def is_out(self, at: float) -> bool:
         """Whether no number that is on disk is left at `at`."""
-        return self._ticks(at) >= self.floor
+        return not self.is_lost and self._ticks(at) >= self.floor
 
     def is_used_up(self, at: float) -> bool:
         """Whether the key is used up at `at`."""
-        return self._ticks(at) >= N_TICKS
+        return not self.is_lost and self._ticks(at) >= N_TICKS
 
     def wanted_floor(self, at: float) -> int | None:
         """The floor that should be written to disk now; None: the present one suffices."""
+        if self.is_lost:
+            return None
         # Before the first burst, no time has begun.
         ticks = self.newest if self._zero is None else max(self._ticks(at), self.newest)
         if self.floor - ticks > LEAST_RESERVE_S * TICKS_PER_S or self.floor >= N_TICKS:
@@ -94,7 +103,7 @@ class Numbers:
     def fits(self, at: float, seq: int, n: int) -> bool:
         """Whether `n` PDUs from `seq` on can have numbers in a burst at `at`."""
         ticks, last = self._ticks(at), self._last
-        if not self.first <= ticks < self._end:
+        if self.is_lost or not self.first <= ticks < self._end:
             return False
         return all(last[(seq + i) % N_SEQS] < ticks for i in range(n))
 
@@ -102,7 +111,7 @@ class Numbers:
         """The T of a PDU with `seq` in a burst at `at`; None: it must wait."""
         # The PDUs of a burst have one start.
         ticks = self._ticks_then if at == self._then else self._ticks(at)
-        if self._last[seq] >= ticks or not self.first <= ticks < self._end:
+        if self.is_lost or self._last[seq] >= ticks or not self.first <= ticks < self._end:
             return None
         self._last[seq] = ticks
         used = self._used.get(ticks)
@@ -122,11 +131,21 @@ class Numbers:
 
         False if it is too old to know.
         """
-        if ticks < max(self.first, self.newest - REMEMBERED_TICKS):
+        if self.is_lost or ticks < max(self.first, self.newest - REMEMBERED_TICKS):
             return False
         used = self._used.get(ticks)
         return used is None or not used[seq]
 
+    def _begin_at(self, ticks: int) -> None:
+        self._begin = self.first = self.newest = ticks
+        self._zero, self._then = None, -inf
+        self._used.clear()
+        self._last = [-1] * N_SEQS
+
     def _ticks(self, at: float) -> int:
         # Never ahead of the key time: that no PDU seems younger than it is depends on this.
         return whole(self.clock(at) * TICKS_PER_S)
+
+
+def _leap(floor: int) -> int:
+    return min(floor + round(LEAP_S * TICKS_PER_S), N_TICKS)

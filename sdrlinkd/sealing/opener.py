@@ -9,6 +9,7 @@ from sdrlinkd.sealing.held_keys import HeldKeys
 from sdrlinkd.sealing.numbers import Numbers
 from sdrlinkd.sealing.params import SecurityParams
 from sdrlinkd.sealing.peers import Peer, Peers, Proof
+from sdrlinkd.sealing.resuming import Recalling, Resuming
 from sdrlinkd.sealing.strangers import Strangers
 from sdrlinkd.wire import (
     AHEAD_UNIT_S,
@@ -19,7 +20,9 @@ from sdrlinkd.wire import (
     HOP,
     TICKS_PER_S,
     Contact,
+    FoundNumbers,
     KeyTold,
+    LostNumbers,
     Pdu,
     Record,
     RecordType,
@@ -37,6 +40,7 @@ JUST_STARTED_S = 2.0
 _make = tuple.__new__
 """Makes a named tuple in half the time that its own constructor takes."""
 _CONTACT_MARK, _KEY_MARK = bytes((RecordType.CONTACT,)), bytes((RecordType.KEY,))
+_LOST_MARK, _FOUND_MARK = bytes((RecordType.LOST,)), bytes((RecordType.FOUND,))
 
 
 class Opened(NamedTuple):
@@ -62,8 +66,8 @@ class Opener:
 
     def __init__(
         self, own_id: int, pdu_size: int, params: SecurityParams, keys: HeldKeys, numbers: Numbers,
-        peers: Peers, contacts: Contacts, strangers: Strangers, known_before: frozenset[int],
-        hears_self: bool,
+        peers: Peers, contacts: Contacts, strangers: Strangers, recalling: Recalling,
+        known_before: frozenset[int], hears_self: bool,
     ) -> None:  # fmt: skip
         self._own_id = own_id
         self._pdu_size = pdu_size
@@ -73,6 +77,9 @@ class Opener:
         self._peers = peers
         self._contacts = contacts
         self._strangers = strangers
+        self._recalling = recalling
+        self.resuming: Resuming | None = None
+        """Who takes answers about our numbers; None: they are known."""
         self._known_before = known_before
         self._hears_self = hears_self
         self._limit_s = params.late_s
@@ -148,13 +155,17 @@ class Opener:
         return peer.is_late(lead_s, held_s, self._limit_s, own_age_s, True)
 
     def refuses_clear(self, data: bytes, now: float) -> bool:
-        """Whether an intact PDU in the clear is refused; a KEY record in it is noted."""
+        """Whether an intact PDU in the clear is refused; KEY and LOST records in it are noted."""
         if len(data) != self._pdu_size or crc16(data):
             return False
         src = data[1]
-        key = clear_key_in(data, self._pdu_size)
-        if key is not None:
-            self._strangers.tells(src, key, now)
+        record = told_in_clear(data, self._pdu_size)
+        if record is not None:
+            if isinstance(record, KeyTold):
+                self._strangers.tells(src, record, now)
+            elif src != self._own_id:
+                self._strangers.lost(src, now)
+                self._recalling.asked(src, record)
             return True
         is_known = src in self._known_before or self._peers.was_opened(src)
         if self._params.clear == "accept" and not is_known:
@@ -181,7 +192,10 @@ class Opener:
         self, src: int, inner: bytes, lead_s: float, held_s: float, at: float
     ) -> None:
         """Use the CONTACT and KEY records in an inner PDU, if there are some."""
-        if not (_CONTACT_MARK in inner or _KEY_MARK in inner) or not _has_records(inner):
+        is_asking = self.resuming is not None and _FOUND_MARK in inner
+        if not (_CONTACT_MARK in inner or _KEY_MARK in inner or is_asking):
+            return
+        if not _has_records(inner):
             return
         try:
             records = read_control_entries(parse(inner, len(inner), is_intact=True)).records
@@ -192,6 +206,8 @@ class Opener:
                 self._take_contact(self._peers.of(src), record, lead_s, held_s, at)
             elif isinstance(record, KeyTold):
                 self._keys.rotation.told(src, record)
+            elif isinstance(record, FoundNumbers) and record.node == self._own_id and self.resuming:
+                self.resuming.answered(record, at)
 
     def _take_contact(
         self, peer: Peer, contact: Contact, lead_s: float, held_s: float, at: float
@@ -226,13 +242,13 @@ def _has_records(inner: bytes) -> bool:
     return "f" in inner[HEADER_SIZE : HEADER_SIZE + (n + 1) // 2].hex()
 
 
-def clear_key_in(data: bytes, pdu_size: int) -> KeyTold | None:
-    """The KEY record in a PDU in the clear, if there is one."""
-    if _KEY_MARK not in data:
+def told_in_clear(data: bytes, pdu_size: int) -> KeyTold | LostNumbers | None:
+    """The KEY or LOST record in a PDU in the clear, if there is one."""
+    if _KEY_MARK not in data and _LOST_MARK not in data:
         return None
     try:
         pdu: Pdu = parse(data, pdu_size)
     except PduError:
         return None
     records: list[Record] = read_control_entries(pdu).records
-    return next((each for each in records if isinstance(each, KeyTold)), None)
+    return next((each for each in records if isinstance(each, KeyTold | LostNumbers)), None)

@@ -6,10 +6,14 @@ from typing import NamedTuple
 from sdrlinkd.sealing.held_keys import HeldKeys
 from sdrlinkd.sealing.numbers import Numbers
 from sdrlinkd.sealing.peers import Peers
+from sdrlinkd.wire import N_TICKS
 
 
 class Remembered(NamedTuple):
-    """What is on disk: floors by fingerprint, and the newest T of each source, by fingerprint."""
+    """What is on disk: floors by fingerprint, and the newest T of each source, by fingerprint.
+
+    The numbers of a key without a floor are lost; a floor of 0 says that it was never used.
+    """
 
     floors: Mapping[bytes, int] = {}
     newest: Mapping[bytes, Mapping[int, int]] = {}
@@ -46,7 +50,7 @@ class Memory:
         """Note what is on disk now."""
         self.on_disk, self.failed = remembered, ""
         if remembered.in_use == self._keys.own.key.fingerprint:
-            self._numbers.move_floor(remembered.floors[remembered.in_use])
+            self._numbers.move_floor(remembered.floors.get(remembered.in_use, 0))
 
     def not_written(self, why: str) -> None:
         """Note that nothing could be written."""
@@ -73,8 +77,11 @@ class Memory:
             for src, ticks in self._peers.newest(key.kid).items():
                 known[src] = max(known.get(src, 0), ticks)
             newest[key.fingerprint] = known
-        # A floor is never lowered.
-        floors = {**on_disk.floors, own: max(floor, on_disk.floors.get(own, 0))}
-        heard = frozenset(src for each in newest.values() for src in each)
         retired = on_disk.retired | self._keys.rotation.retired
+        # A key that is out of use stays so, even if its numbers are lost.
+        floors = {**dict.fromkeys(self._keys.rotation.retired, N_TICKS), **on_disk.floors}
+        if not self._numbers.is_lost:
+            # A floor is never lowered.
+            floors[own] = max(floor, on_disk.floors.get(own, 0))
+        heard = frozenset(src for each in newest.values() for src in each)
         return Remembered(floors, newest, own, retired, on_disk.known | heard)

@@ -1,7 +1,7 @@
 """Sealing as one object: seals our PDUs, and holds all that opening those of others needs."""
 
 from collections.abc import Callable, Sequence
-from math import inf
+from math import ceil, inf
 
 from sdrlinkd.reports import SecurityReport
 from sdrlinkd.sealing.contacts import PATIENCE_S, Contacts
@@ -12,6 +12,7 @@ from sdrlinkd.sealing.opener import Opener
 from sdrlinkd.sealing.params import SecurityParams
 from sdrlinkd.sealing.peers import Peers
 from sdrlinkd.sealing.remembered import Memory, Remembered
+from sdrlinkd.sealing.resuming import DAY_S, Ages, Recalling, Resuming, is_ahead
 from sdrlinkd.sealing.strangers import Strangers
 from sdrlinkd.wire import (
     CONTACT_NUMBER_SIZE,
@@ -19,7 +20,9 @@ from sdrlinkd.wire import (
     SEAL_OVERHEAD,
     TICKS_PER_S,
     Contact,
+    FoundNumbers,
     KeyTold,
+    LostNumbers,
     delayed,
     depends_on_start,
     is_sealed,
@@ -27,7 +30,6 @@ from sdrlinkd.wire import (
     with_seq,
 )
 
-DAY_S = 86400.0
 USED_UP_DAYS = 30.0
 """Days before the end of a key from which a person is told."""
 RECENT_S, PROVES_S = 10.0, 5.0
@@ -41,7 +43,8 @@ FORGOTTEN_S = 60.0
 class Sealing:
     """Seals our PDUs, and opens those of others. Times are on the link's clock, in s.
 
-    `remembered` is what was on disk at the start, and `draw` gives random octets.
+    `remembered` is what was on disk at the start, and `draw` gives random octets. `machine` is
+    what tells this machine from others, in its first octets by its id and in the last by its start.
     """
 
     is_on = True
@@ -56,24 +59,29 @@ class Sealing:
         draw: Callable[[int], bytes],
         *,
         hears_self: bool = False,
+        machine: bytes = b"",
     ) -> None:
         self.inner_size = pdu_size - SEAL_OVERHEAD
         self._own_id = own_id
         self._params = params
         self._keys = HeldKeys(keys, params.mode, remembered.in_use)
-        self._numbers = Numbers(remembered.floors.get(self._keys.own.key.fingerprint, 0))
+        self._numbers = Numbers(remembered.floors.get(self._keys.own.key.fingerprint))
         self._peers = Peers(self._oldest)
-        self._contacts = Contacts(draw(CONTACT_NUMBER_SIZE))
+        self._contacts = Contacts(draw(CONTACT_NUMBER_SIZE), machine)
         self._strangers = Strangers(self._keys)
+        self._draw = draw
+        self._recalling = Recalling(draw)
+        self._ages = Ages()
         self.opener = Opener(
             own_id, pdu_size, params, self._keys, self._numbers, self._peers, self._contacts,
-            self._strangers, remembered.known, hears_self,
+            self._strangers, self._recalling, remembered.known, hears_self,
         )  # fmt: skip
         self.memory = Memory(remembered, self._keys, self._numbers, self._peers)
         self._waits = 0
         self._is_used_up = self._is_out = False
         self._out_since = inf
         """Since when no number is left that is on disk."""
+        self._lost_words = ""
 
     @property
     def halted(self) -> str:
@@ -83,6 +91,8 @@ class Sealing:
                 f"another robot has our id {self._own_id} and our key: give it an id of its own, "
                 "then restart both"
             )
+        if self._lost_words:
+            return self._lost_words
         if self._is_used_up:
             kid = self._keys.own.key.kid
             return f"key {kid} is used up: make the next one with sdrlinkctl key rotate"
@@ -92,6 +102,8 @@ class Sealing:
 
     def may_send(self, start: float, seq: int, n: int) -> bool:
         """Whether a burst at `start` can hold `n` PDUs of ours from `seq` on."""
+        if self._numbers.is_lost:
+            return False
         self._is_used_up = self._numbers.is_used_up(start)
         if not self._numbers.is_out(start):
             self._out_since = inf
@@ -146,22 +158,54 @@ class Sealing:
     @property
     def contact_due_at(self) -> float:
         """When the next CONTACT is due."""
-        return self._contacts.due_at
+        return inf if self._numbers.is_lost else self._contacts.due_at
 
     @property
-    def key_due_at(self) -> float:
-        """When to tell our key in the clear."""
-        return self._strangers.key_due_at
+    def is_lost(self) -> bool:
+        """Whether the numbers of the key in use are lost, so that nothing is sealed."""
+        return self._numbers.is_lost
+
+    @property
+    def clear_due_at(self) -> float:
+        """When to tell something in the clear: our key, or that our numbers are lost."""
+        resuming = self.opener.resuming
+        due_at = inf if resuming is None else resuming.due_at
+        return min(due_at, self._strangers.key_due_at)
 
     def further_key(self) -> KeyTold | None:
         """The KEY record, to be sealed, of a key to which this robot can change."""
         key = self._keys.rotation.further
         return None if key is None else self._keys.told(key)
 
-    def clear_key(self, now: float) -> KeyTold:
-        """The KEY record to be told in the clear at `now`, as PDUs of others do not open."""
+    def told_in_clear(self, now: float) -> KeyTold | LostNumbers:
+        """The record to be told in the clear at `now`.
+
+        It is KEY, as PDUs of others do not open, or LOST.
+        """
+        resuming = self.opener.resuming
+        if resuming is not None and resuming.due_at <= now:
+            return resuming.ask(now)
         self._strangers.key_told(now)
         return self._keys.told(self._keys.own.key)
+
+    def found(self, now: float) -> list[FoundNumbers]:
+        """What to tell robots at `now` that have lost their numbers."""
+        if self._numbers.is_lost:
+            return []
+        found = []
+        for src, lost in self._recalling.due(now):
+            held = self._keys.by_kid.get(lost.kid)
+            if held is None or not held.key.fingerprint.startswith(lost.fingerprint):
+                continue
+            newest = max(self._oldest(src, lost.kid), self._peers.newest(lost.kid).get(src, 0))
+            age_s = self._ages.age_s(held.key, now)
+            age = None if age_s is None else min(ceil(age_s * TICKS_PER_S), N_TICKS)
+            found.append(FoundNumbers(src, lost.number, lost.kid, newest, age))
+        return found
+
+    def tell_ages(self, ages_s: dict[bytes, float], now: float) -> None:
+        """Note the ages of keys in s at `now`, by fingerprint, if the host's clock is trusted."""
+        self._ages.tell(ages_s, now)
 
     def install(self, keys: Sequence[Key], loaded: Remembered) -> None:
         """Hold other keys from now on; the one in use stays until the others have the next one.
@@ -175,20 +219,39 @@ class Sealing:
             if held.get(key.kid, key.fingerprint) != key.fingerprint:
                 self._peers.change_key(key.kid)
         self.memory.add(loaded)
-        if self._keys.own.key.fingerprint != before.fingerprint:
+        own = self._keys.own.key.fingerprint
+        if own != before.fingerprint or (self._numbers.is_lost and own in loaded.floors):
             self._changed()
 
     def look(self, now: float) -> None:
-        """Change to the next key if it is time. The first look is the start of this life."""
+        """Change to the next key, or go on with lost numbers, if it is time.
+
+        The first look is the start of this life.
+        """
         self._peers.begin(now)
         heard_at = {src: peer.heard_at for src, peer in self._peers if src != self._own_id}
         if self._keys.look(now, heard_at):
             self._changed()
+        if self._numbers.is_lost:
+            self._resume(now)
+
+    def _resume(self, now: float) -> None:
+        """Ask for lost numbers, and go on once it is known which ones were used."""
+        key, resuming = self._keys.own.key, self.opener.resuming
+        if resuming is None:
+            resuming = self.opener.resuming = Resuming(key, self._draw(CONTACT_NUMBER_SIZE), now)
+        floor = resuming.floor(now, self._ages.age_s(key, now))
+        self._lost_words = resuming.words(now)
+        if floor is not None:
+            self._numbers.resume(floor)
+            self._contacts.met_somebody(now)
+            self.opener.resuming, self._lost_words = None, ""
 
     def _changed(self) -> None:
         """Go on with another key; nothing leaves before its floor is on disk."""
-        floor = self.memory.on_disk.floors.get(self._keys.own.key.fingerprint, 0)
+        floor = self.memory.on_disk.floors.get(self._keys.own.key.fingerprint)
         self._numbers.change_key(floor)
+        self.opener.resuming, self._lost_words = None, ""
 
     def notices(self, now: float) -> list[str]:
         """What a person should know, in sentences."""
@@ -207,15 +270,32 @@ class Sealing:
             f"robot {src} has our key and has not proven to be alive: does it hear us?"
             for src, peer in self._peers
             if src != self._own_id
+            # Without numbers, nothing of ours can be heard.
+            and not self._numbers.is_lost
             and now - peer.heard_at < RECENT_S
             and not peer.is_proven(now)
             and now - peer.first_at > PROVES_S
         ]
+        found += [
+            f"robot {src} has the machine id of this one, so one disk is a copy of the other: give "
+            "the copy an id of its own with systemd-machine-id-setup"
+            for src in self._copies()
+        ]
+        return found if self._numbers.is_lost else found + self._key_notices(now)
+
+    def _key_notices(self, now: float) -> list[str]:
+        found, key = [], self._keys.own.key
         days = self._days_left(now)
         if days < USED_UP_DAYS:
             found.append(
-                f"key {self._keys.own.key.kid} can be used for {days:.0f} more days: make the next "
-                "one with sdrlinkctl key rotate"
+                f"key {key.kid} can be used for {days:.0f} more days: make the next one with "
+                "sdrlinkctl key rotate"
+            )
+        age_s = self._ages.age_s(key, now)
+        if age_s is not None and is_ahead(self._numbers, age_s, now):
+            found.append(
+                f"the daemon was restarted so often that its numbers of key {key.kid} are ahead of "
+                "the key's age: if this robot loses its state, make the next key"
             )
         return found
 
@@ -236,10 +316,16 @@ class Sealing:
             further_kids=[key.kid for key in self._keys.all if key != own],
             proven=sorted(src for src, is_proven in heard.items() if is_proven),
             not_proven=sorted(src for src, is_proven in heard.items() if not is_proven),
-            key_days_left=self._days_left(now),
+            key_days_left=None if self._numbers.is_lost else self._days_left(now),
             waits=self._waits,
             halted=self.halted,
+            copies=self._copies(),
         )
+
+    def _copies(self) -> list[int]:
+        """Robots whose disk is a copy of ours, or the other way round."""
+        others = [(src, peer.number) for src, peer in self._peers if src != self._own_id]
+        return sorted(src for src, number in others if self._contacts.is_copy(number))
 
     def _days_left(self, now: float) -> float:
         return max(0.0, N_TICKS / TICKS_PER_S - self._numbers.clock(now)) / DAY_S

@@ -24,6 +24,8 @@ class _Stranger:
     """When a PDU of it last was delayed by more than it says."""
     old_at: float = -inf
     """When a PDU of it last had an old number."""
+    lost_at: float = -inf
+    """When it last said that it has lost its numbers."""
     told: KeyTold | None = None
     told_at: float = -inf
 
@@ -54,6 +56,10 @@ class Strangers:
         """Note that a PDU of robot `src` has an old number."""
         self._of(src).old_at = now
 
+    def lost(self, src: int, now: float) -> None:
+        """Note that robot `src` says that it has lost its numbers."""
+        self._of(src).lost_at = now
+
     def tells(self, src: int, told: KeyTold, now: float) -> None:
         """Note a KEY record of robot `src` in the clear."""
         stranger = self._of(src)
@@ -63,7 +69,7 @@ class Strangers:
         """Forget that PDUs of robot `src` do not open, as one does."""
         stranger = self.by_src.get(src)
         if stranger is not None:
-            stranger.closed_at = stranger.told_at = stranger.clear_at = -inf
+            stranger.closed_at = stranger.told_at = stranger.clear_at = stranger.lost_at = -inf
 
     @property
     def key_due_at(self) -> float:
@@ -83,6 +89,11 @@ class Strangers:
             told = each.told if now - each.told_at < FORGET_S else None
             if now - each.closed_at < FORGET_S or (told is not None and self._differs(told)):
                 found.append(self._does_not_open(src, each, now))
+            elif now - each.lost_at < FORGET_S:
+                found.append(
+                    f"robot {src} has lost the numbers of its key, and sends nothing sealed until "
+                    "it has others"
+                )
             elif now - each.clear_at < FORGET_S:
                 found.append(
                     f"robot {src} sends in the clear and is not heard: give it the team's key, or "

@@ -36,7 +36,9 @@ from sdrlinkd.wire.contact import (
     KEY_PREFIX_SIZE,
     MET_SIZE,
     Contact,
+    FoundNumbers,
     KeyTold,
+    LostNumbers,
     Met,
 )
 from sdrlinkd.wire.control import (
@@ -283,11 +285,13 @@ __all__ = [
     "Description",
     "Entry",
     "Flows",
+    "FoundNumbers",
     "Frame",
     "Grant",
     "KeyTold",
     "LinkReport",
     "Lost",
+    "LostNumbers",
     "Lsa",
     "Met",
     "Need",

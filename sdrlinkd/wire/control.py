@@ -9,13 +9,21 @@ from sdrlinkd.errors import PduError
 from sdrlinkd.wire.clock import CLOCK_SIZE, Clock, build_clock, parse_clock
 from sdrlinkd.wire.contact import (
     CONTACT_NUMBER_SIZE,
+    FOUND_SIZE,
     KEY_SIZE,
+    LOST_SIZE,
     Contact,
+    FoundNumbers,
     KeyTold,
+    LostNumbers,
     build_contact,
+    build_found,
     build_key,
+    build_lost,
     parse_contact,
+    parse_found,
     parse_key,
+    parse_lost,
 )
 from sdrlinkd.wire.declared import TopicPiece, build_topic, parse_topic
 from sdrlinkd.wire.granting import (
@@ -105,6 +113,8 @@ Record = (
     | Grant
     | Flows
     | Admit
+    | LostNumbers
+    | FoundNumbers
 )
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
@@ -157,6 +167,8 @@ _LEAST = {
     int(RecordType.GRANT): GRANT_OVERHEAD - TLV_HEADER_SIZE,
     int(RecordType.FLOWS): FLOWS_OVERHEAD - TLV_HEADER_SIZE,
     int(RecordType.ADMIT): ADMIT_OVERHEAD - TLV_HEADER_SIZE,
+    int(RecordType.LOST): LOST_SIZE,
+    int(RecordType.FOUND): FOUND_SIZE,
 }
 
 
@@ -179,6 +191,8 @@ _READERS: dict[int, Callable[[bytes], Record]] = {
     RecordType.GRANT: parse_grant,
     RecordType.FLOWS: parse_flows,
     RecordType.ADMIT: parse_admit,
+    RecordType.LOST: parse_lost,
+    RecordType.FOUND: parse_found,
 }
 """Readers of the values of records without fixed fields, by type number."""
 
@@ -266,6 +280,8 @@ _BUILDERS: dict[type[Record], tuple[RecordType, Callable[[Any], bytes]]] = {
     Grant: (RecordType.GRANT, build_grant),
     Flows: (RecordType.FLOWS, build_flows),
     Admit: (RecordType.ADMIT, build_admit),
+    LostNumbers: (RecordType.LOST, build_lost),
+    FoundNumbers: (RecordType.FOUND, build_found),
 }
 
 

@@ -33,6 +33,8 @@ class RecordType(IntEnum):
     BARE = 21
     FLOWS = 22
     ADMIT = 23
+    LOST = 27
+    FOUND = 28
 
 
 class Stamp(NamedTuple):

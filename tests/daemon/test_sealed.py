@@ -7,6 +7,7 @@ import pytest
 from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.keyring import KeyFile, create_key_file, new_key
+from sdrlinkd.wire import LostNumbers, parse, read_control_entries
 from tests.programs import sdrlinkd
 from tests.sealing import vectors
 from tests.waiting import wait_for
@@ -54,7 +55,7 @@ def installed(write_config, folder, robot, ports, key_file, **more):
     """A configuration, with the key installed for its robot."""
     config = text(robot, ports, folder / f"keys_{robot}.toml", **more)
     path = write_config(folder, config)
-    assert run(["key", "install", str(key_file), "--config", str(path)]) == 0
+    assert run(["key", "install", "--new", str(key_file), "--config", str(path)]) == 0
     return config
 
 
@@ -145,7 +146,6 @@ def test_a_restart_is_believed_again(team):
 
 @pytest.mark.parametrize(("prepare", "says"), [
     ("none", "cannot be read (No such file or directory); sdrlinkctl key install puts a key there"),
-    ("copied", "no numbers of key 0. If it was never installed on this robot: sdrlinkctl key "),
     ("open", "others can read it (mode 0644); allowed: 0600"),
     ("no state", "security.state_dir:"),
 ])  # fmt: skip
@@ -185,27 +185,79 @@ def test_key_install_says_what_is_left_to_do(write_config, folder, ports, key_fi
     assert run([*line, "--replace"]) == 0
 
 
+def states(folder):
+    return sorted((folder / "state" / "sdrlinkd").glob("*.json"))
+
+
 def test_numbers_that_are_lost_are_not_begun_again(write_config, folder, ports, key_file, capsys):
     path = write_config(folder, text(1, ports, folder / "keys.toml"))
-    line = ["key", "install", str(key_file), "--config", str(path)]
-    assert run(line) == 0
-    assert run(line) == 0
-    for each in (folder / "state" / "sdrlinkd").glob("*.json"):
-        each.unlink()
-    for again in (line, ["key", "install", "--config", str(path)]):
+
+    def install(*more):
         capsys.readouterr()
-        assert run(again) == 2
-        assert "numbers of key 0 were here and are lost" in capsys.readouterr().err
-    # With the next key, all is well.
+        code = run(["key", "install", *map(str, more), "--config", str(path)])
+        told = capsys.readouterr()
+        return code, told.out + told.err
+
+    lost = "the numbers of key 0 are not here, so this robot may have used any"
+    for _ in range(2):
+        code, said = install(key_file)
+        assert (code, lost in said, states(folder)) == (0, True, [])
+    code, said = install("--new", key_file)
+    assert (code, states(folder)) == (2, [])
+    assert "--new: robot 1 has used key 0, and its numbers in " in said
+    # A computer that has never seen the robot takes the word of its owner.
+    (folder / "keys.toml").unlink()
+    code, said = install("--new", key_file)
+    assert (code, lost in said, len(states(folder))) == (0, False, 1)
+    # All numbers are here since the first key, so the next one is known to be new.
     assert run(["key", "rotate", str(folder / "next.key"), "--config", str(path)]) == 0
-    assert (
-        run(["key", "install", "--replace", str(folder / "next.key"), "--config", str(path)]) == 0
-    )
+    code, said = install(folder / "next.key")
+    assert (code, "not here" in said, len(states(folder))) == (0, False, 2)
+    for each in states(folder):
+        each.unlink()
+    code, said = install("--replace", folder / "next.key")
+    assert (code, states(folder)) == (0, [])
+    assert "the numbers of key 1 are not here" in said
+
+
+def test_a_robot_with_another_disk_seals_nothing_and_says_what_to_do(
+    start_daemon, write_config, folder, ports, key_file
+):
+    config = installed(write_config, folder, 1, ports, key_file)
+    with socket.socket(type=socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", ports[1]))
+        other.settimeout(10)
+        for each in states(folder):
+            each.unlink()
+        daemon = start_daemon(config)
+        with Publisher(daemon.directory) as out:
+            out.send("/robot_1/odom", CDR)
+        for _ in range(3):
+            (record,) = read_control_entries(parse(other.recv(SIZE), SIZE)).records
+            assert isinstance(record, LostNumbers)
+    verdict = daemon.snapshot().verdict
+    assert verdict.level == "DOWN"
+    assert verdict.reasons[0].startswith("the numbers of key 0 are lost here: the other robots are")
+    assert states(folder) == []
+
+
+@pytest.mark.long
+def test_a_robot_with_another_disk_is_helped(start_daemon, write_config, folder, ports, key_file):
+    """Nothing is said but what its key file says, and the others."""
+    configs = [installed(write_config, folder, each, ports, key_file) for each in (1, 2)]
+    one, two = [start_daemon(config) for config in configs]
+    wait_for(lambda: proves(one, 2) and proves(two, 1))
+    one.ends_well()
+    states(folder)[0].unlink()
+    one.at_work()
+    wait_for(lambda: proves(one, 2) and proves(two, 1), 60)
+    assert len(states(folder)) == 2
+    assert one.snapshot().link.security.key_days_left < 98
 
 
 def test_a_file_with_too_many_keys_is_not_written(write_config, folder, ports, key_file, capsys):
     path = write_config(folder, text(1, ports, folder / "keys.toml"))
-    assert run(["key", "install", str(key_file), "--config", str(path)]) == 0
+    assert run(["key", "install", "--new", str(key_file), "--config", str(path)]) == 0
     before = (folder / "keys.toml").read_bytes()
     two = folder / "two.key"
     create_key_file(two, KeyFile(key=[*new_key(1).key, *new_key(2).key]))

@@ -12,7 +12,6 @@ from sdrlinkd.doctor import (
     Granted,
     Headroom,
     HostTerm,
-    KernelClock,
     State,
     check_clock,
     check_directory,
@@ -21,12 +20,13 @@ from sdrlinkd.doctor import (
     check_host,
     check_limits,
     check_machine,
+    check_machine_id,
     check_radio,
     check_usb,
     granted,
-    kernel_clock,
     measure_host,
 )
+from sdrlinkd.kernelclock import KernelClock, kernel_clock
 
 GOOD, BAD, NONE = State.GOOD, State.BAD, State.NONE
 STAT = "cpu  {} 0 10 70 0 0 0 {} 0 0\ncpu0 1 2 3\n"
@@ -77,6 +77,17 @@ def test_the_machine(tmp_path, given, what, state):
 def test_a_machine_that_tells_nothing(tmp_path):
     found = states(check_machine(2, 0.0, ("", ""), tmp_path, is_timed=True))
     assert (found["stolen time"], found["frequency governor"]) == (NONE, NONE)
+
+
+def test_the_id_of_a_machine():
+    for given, copies, state, told in (
+        ("3d1219c7c4c5404a", None, GOOD, "3d1219c7…"),
+        ("3d1219c7c4c5404a", [], GOOD, "3d1219c7…, not heard of any other robot"),
+        ("3d1219c7c4c5404a", [2, 7], BAD, "that of robot 2 and robot 7, too"),
+        ("", None, NONE, "none"), ("uninitialized", [], NONE, "none"),
+    ):  # fmt: skip
+        found = check_machine_id(given, copies)
+        assert (found.state, found.told.startswith(told)) == (state, True)
 
 
 def environment(tmp_path, requirements=(), versions=None, library=Path("modem.so"), phy_home=None):

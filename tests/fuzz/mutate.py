@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 from random import Random
 
-from sdrlinkd.sealing import Remembered, Sealing, SecurityParams
+from sdrlinkd.sealing import Sealing, SecurityParams
 from sdrlinkd.wire import (
     SEAL_OVERHEAD,
     Admit,
@@ -14,10 +14,12 @@ from sdrlinkd.wire import (
     Clock,
     Contact,
     Flows,
+    FoundNumbers,
     Frame,
     Grant,
     KeyTold,
     LinkReport,
+    LostNumbers,
     Lsa,
     Met,
     Need,
@@ -35,7 +37,7 @@ from sdrlinkd.wire import (
     build_records,
     crc16,
 )
-from tests.fuzz.targets import KEY, PDU_SIZE
+from tests.fuzz.targets import KEY, NEW, PDU_SIZE
 
 EDGES = (0, 1, 2, 3, 4, 5, 6, 13, 14, 15, 16, 17, 127, 128, 254, 255)
 WORDS = ("0", "-1", "1e999", "nan", '""', "[]", "{}", "true", "9" * 30, '"9 GHz"', "0x7f", "null")
@@ -48,6 +50,7 @@ RECORDS = (
     Need(1, 300, b"\x81"), TopicPiece(16, 7, 0, 1, b"\0\0" + bytes(8) + b"odom\0pkg/msg/Odom"),
     Wanted(1, b"\x10\x11"), Repeat(1, 300, 12, 2),
     Contact(bytes(8), (Met(2, bytes(4), 3),)), KeyTold(1, False, bytes(4)),
+    LostNumbers(1, bytes(4), bytes(8)), FoundNumbers(1, bytes(8), 0, 3, 4),
     Lsa(1, 7, ((2, 3), (3, 16))), Lsa(255, 0x1234), Route(2, 255, 300, b"\1\3"), Bare(44, b"\xa1"),
     Want(1, 0, 64, 3, 40, 50), Grant(7, 1, 900, ((1, 9), (5, 0), (255, 3))),
     Flows(1, 7, (ReservedFlow(0, 255, 3, 64, 300, 20_000, 900),)), Flows(2, 8),
@@ -132,7 +135,12 @@ class Source:
 
     def __init__(self) -> None:
         self._sealing = Sealing(
-            1, PDU_SIZE, SecurityParams(mode="seal"), [KEY], Remembered(), Random(2).randbytes
+            1,
+            PDU_SIZE,
+            SecurityParams(mode="seal"),
+            [KEY],
+            NEW,
+            Random(2).randbytes,
         )
         self._now = 0.0
 

@@ -33,6 +33,8 @@ from tests.link.world import make_link, next_burst
 
 PDU_SIZE = 64
 KEY = Key(1, bytes(range(32)))
+NEW = Remembered({KEY.fingerprint: 0})
+"""What is on disk of a key that was never used."""
 STEP_S = 0.01
 FORGET_AFTER = 400
 """A link starts anew after so many inputs, so that a crash can be repeated."""
@@ -102,7 +104,12 @@ class Opening:
         if self._n >= FORGET_AFTER:
             self._n = 0
             self._sealing = Sealing(
-                2, PDU_SIZE, SecurityParams(mode="seal"), [KEY], Remembered(), Random(1).randbytes
+                2,
+                PDU_SIZE,
+                SecurityParams(mode="seal"),
+                [KEY],
+                NEW,
+                Random(1).randbytes,
             )
         self._n += 1
         at = STEP_S * self._n

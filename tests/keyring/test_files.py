@@ -15,6 +15,7 @@ from sdrlinkd.keyring import (
     words_of,
     write_key_file,
 )
+from sdrlinkd.keyring.testing import CONSTANTS
 
 SECRET = "AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8="
 PAIR = "ICEiIyQlJicoKSorLC0uLzAxMjM0NTY3ODk6Ozw9Pj8="
@@ -129,3 +130,23 @@ def test_a_fingerprint_is_eight_words():
     key = StoredKey(kid=0, secret=bytes(range(32)))
     assert key.fingerprint.hex() == "3b83b6a3b1bad4a4e7e348"
     assert words_of(key.fingerprint) == "describe buffalo pottery gloom pull fame panel harbor"
+
+
+def test_when_a_key_was_made(written):
+    for created, made_s in (
+        ("2026-11-25T14:02:11Z", 1795615331.0), ("2026-11-25T16:02:11+02:00", 1795615331.0),
+        ("2026-11-25", None), ("", None), ("last year", None),
+    ):  # fmt: skip
+        (key,) = load_keys(written(GOOD + f'created = "{created}"\n'))
+        assert key.made_s == made_s, created
+    for created in ("2026-11-25T14:02:11", "T", "2026-13-25T14:02:11Z"):
+        with pytest.raises(UserError, match=r"keys\.toml: created = .*; allowed: a time such as"):
+            load_keys(written(GOOD + f'created = "{created}"\n'))
+
+
+@pytest.mark.parametrize("is_synchronized", [True, False])
+def test_a_key_says_when_it_was_made_if_that_is_known(monkeypatch, is_synchronized):
+    monkeypatch.setattr(*CONSTANTS["is_synchronized"], lambda: is_synchronized)
+    (key,) = new_key(0).key
+    assert (key.made_s is not None) is is_synchronized
+    assert len(key.made_on) == 10

@@ -46,10 +46,12 @@ from sdrlinkd.wire import (
     Description,
     Entry,
     Flows,
+    FoundNumbers,
     Frame,
     Grant,
     KeyTold,
     LinkReport,
+    LostNumbers,
     Parity,
     Pdu,
     PduBuilder,
@@ -542,7 +544,8 @@ REPORT, FLOWS = LinkReport(2, 40, 0, 1), Flows(9, 1)
 def test_records_count_as_far_as_somebody_vouches_for_them(how, used):
     elsewhere = (
         Parity(0, 1, 2, 1, 0, 0, 1, 2, b"x"), Stamp(0, 1, 2), Contact(bytes(8)),
-        KeyTold(0, False, bytes(4)),
+        KeyTold(0, False, bytes(4)), LostNumbers(0, bytes(4), bytes(8)),
+        FoundNumbers(2, bytes(8), 0, 0, None),
     )  # fmt: skip
     given_records = (BEACON, FRAME, GRANT, REPORT, FLOWS, *elsewhere)
     assert records_of(*given_records, **how) == (used, [])

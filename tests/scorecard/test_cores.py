@@ -153,6 +153,32 @@ def test_row_15_numbers_over_restarts(lasting, figure):
     figure(15, "restarts with power cuts and full disks", f"{restarts}, {numbers} numbers, 0 twice")
 
 
+def test_row_22_robots_that_lost_their_disks(lasting, figure):
+    """A life lasts for half a day at most; one in three ends with another disk."""
+    chance, lives, lost, refused, numbers = Random(22), 0, 0, 0, 0
+    for _ in lasting():
+        machine = Machine()
+        for _ in range(200):
+            keys = [KEY] if chance.random() < 0.5 else [KEY, NEXT]
+            if chance.random() < 1 / 3:
+                machine.do("lose", (keys, chance.random() < 0.5, chance.random() < 0.7))
+                lost += 1
+            else:
+                machine.do("restart", keys)
+            machine.do("time", 25.0)
+            for _ in range(chance.randrange(1, 6)):
+                machine.do("send", 20)
+                machine.do("time", 10_000 * chance.random() ** 3)
+            refused += machine.sealing.is_lost
+            lives += 1
+        numbers += len(machine.used)
+    figure(
+        22, "robots that lost their disks",
+        f"{lost} of {lives} lives, {refused} of them without clock and company sent nothing, "
+        f"{numbers} numbers, 0 twice",
+    )  # fmt: skip
+
+
 def test_row_17_recordings(seconds, figure):
     chance, team = Random(17), pair()
     recorder = Recorder(team, 2, chance)

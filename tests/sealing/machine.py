@@ -1,20 +1,35 @@
-"""A robot's sealing and what its disk keeps of it."""
+"""A robot's sealing and what its disk keeps of it, or does not."""
 
 from sdrlinkd.sealing import Remembered, Sealing
-from sdrlinkd.wire import N_TICKS, parse_sealed
-from tests.sealing.team import KEY, NEXT, SEALED
+from sdrlinkd.wire import (
+    BROADCAST,
+    CONTROL_TOPIC_ID,
+    N_TICKS,
+    Entry,
+    Pdu,
+    build,
+    build_records,
+    parse_sealed,
+)
+from tests.sealing.team import KEY, NEW, NEXT, SEALED
 
 SIZE = 64
 
 
 class Machine:
-    """One robot's sealing over its lives, and every number that it has used."""
+    """One robot's sealing over its lives, and every number that it has used.
+
+    `age_s` is true time since its keys were made. `is_synchronized`: its host knows that, too.
+    `in_reach`: another robot hears what it sends, and answers.
+    """
 
     def __init__(self):
-        self.disk, self.disk_is = Remembered(), "works"
+        self.disk, self.disk_is = NEW, "works"
         self.now, self.seq = 0.0, 0
         self.used, self.sent = set(), 0
         self.last = []
+        self.age_s, self.is_synchronized, self.in_reach = 0.0, True, True
+        self.heard, self.answers = {KEY: 0, NEXT: 0}, 0
         self.restart([KEY])
 
     def restart(self, keys):
@@ -22,6 +37,38 @@ class Machine:
         keys = usable or [key for key in (KEY, NEXT) if key.fingerprint not in self.disk.retired]
         self.sealing = Sealing(1, SIZE, SEALED, keys, self.disk, lambda n: bytes(n))
         self.now, self.last = 0.0, []
+        self.sealing.look(0.0)
+
+    def lose(self, keys, is_synchronized, in_reach):
+        """Another disk, with the same keys."""
+        self.disk, self.is_synchronized, self.in_reach = Remembered(), is_synchronized, in_reach
+        self.restart(keys)
+
+    def resume(self):
+        """Ask whom it may concern for numbers that are lost, and go on once they are known."""
+        sealing = self.sealing
+        ages_s = {key.fingerprint: self.age_s for key in (KEY, NEXT)}
+        sealing.tell_ages(ages_s if self.is_synchronized else {}, self.now)
+        sealing.look(self.now)
+        if sealing.is_lost and sealing.clear_due_at <= self.now:
+            question = in_pdu(SIZE, 1, sealing.told_in_clear(self.now))
+            if self.in_reach:
+                sealing.opener.open(self.answer(question), self.now)
+            sealing.look(self.now)
+
+    def answer(self, question):
+        """What a robot says that has heard this one before, and has no clock."""
+        newest = {key.fingerprint: {1: ticks} for key, ticks in self.heard.items()}
+        self.answers += 1
+        floor = 3200 * self.answers
+        disk = Remembered({KEY.fingerprint: floor, NEXT.fingerprint: floor}, newest)
+        keys = [key for key in (KEY, NEXT) if key.kid == self.sealing.report(self.now).kid]
+        other = Sealing(2, SIZE, SEALED, keys, disk, lambda n: bytes(n))
+        other.memory.written(other.memory.wanted(0.0))
+        other.may_send(0.0, 0, 1)
+        assert other.opener.refuses_clear(question, self.age_s)
+        (found,) = other.found(self.age_s)
+        return other.seal(in_pdu(SIZE - 14, 2, found), 0.0)
 
     def write(self):
         memory = self.sealing.memory
@@ -51,6 +98,9 @@ class Machine:
         number = (pdu.kid, pdu.ticks, pdu.seq)
         assert number not in self.used
         self.used.add(number)
+        if self.in_reach:
+            key = NEXT if pdu.kid else KEY
+            self.heard[key] = max(self.heard[key], pdu.ticks)
 
     def do(self, kind, value):
         if kind == "send":
@@ -58,7 +108,8 @@ class Machine:
             self.send(value)
         elif kind == "time":
             self.now += value
-            self.sealing.look(self.now)
+            self.age_s += max(value, 0.0)
+            self.resume()
         elif kind == "late" and self.last:
             # It did not leave, and is sealed anew, as its content depends on the start.
             inner, start = self.last[-1]
@@ -76,3 +127,11 @@ class Machine:
             self.send(5)
         elif kind == "restart":
             self.restart(value)
+        elif kind == "lose":
+            self.lose(*value)
+
+
+def in_pdu(size, src, record):
+    """A PDU of `src` with one record."""
+    entry = Entry(CONTROL_TOPIC_ID, 0, 0, 1, build_records([record]))
+    return build(Pdu(0, False, src, BROADCAST, 0, 1, [entry]), size)

@@ -32,6 +32,8 @@ from sdrlinkd.wire import make_registry
 KEY = Key(0, bytes(range(32)))
 NEXT = Key(1, bytes(range(32, 64)))
 SEALED = SecurityParams(mode="seal")
+NEW = Remembered({KEY.fingerprint: 0, NEXT.fingerprint: 0})
+"""What is on disk of two keys that were never used."""
 TOPICS = (("cmd_vel", "geometry_msgs/Twist"), ("odom", "nav_msgs/Odometry"))
 LIFESPAN_S = 0.3
 STEP_S = 0.005
@@ -61,7 +63,8 @@ class Robot:
     access: AccessParams = field(default_factory=AccessParams)
     pdu_size: int = 128
     drift: float = 0.0
-    disk: Remembered = field(default_factory=Remembered)
+    disk: Remembered = NEW
+    machine: bytes = b""
     disk_works: bool = True
     heard: list[Heard] = field(default_factory=list)
     lives: int = 0
@@ -76,7 +79,13 @@ class Robot:
         if self.params.mode != "off":
             keys = [key for key in self.keys if key.fingerprint not in self.disk.retired]
             self.sealing = Sealing(
-                self.id, self.pdu_size, self.params, keys, self.disk, chance.randbytes
+                self.id,
+                self.pdu_size,
+                self.params,
+                keys,
+                self.disk,
+                chance.randbytes,
+                machine=self.machine,
             )
         self.link = Link(
             LinkParams(pdu_size=self.pdu_size, hop_limit=self.hop_limit),

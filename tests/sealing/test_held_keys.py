@@ -113,7 +113,7 @@ def test_the_ciphers_follow_the_keys():
 
 
 def memory(remembered=None, keys=(KEY,)):
-    remembered = remembered or Remembered()
+    remembered = remembered or Remembered({KEY.fingerprint: 0})
     held = HeldKeys(list(keys), "seal", remembered.in_use)
     numbers = Numbers(remembered.floors.get(held.own.key.fingerprint, 0))
     peers = Peers(lambda _src, _kid: 0)
@@ -157,6 +157,7 @@ def test_what_was_heard_of_each_robot_is_kept_and_no_floor_is_lowered():
     assert kept.at_stop().floors[KEY.fingerprint] == 99_000
     held.rotation.retired.add(b"new")
     assert kept.wanted(0.0).retired == {b"old", b"new"}
+    assert kept.wanted(0.0).floors[b"new"] == N_TICKS, "its numbers are lost; it stays out of use"
 
 
 def test_what_is_on_disk_of_keys_that_are_installed_is_added():

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import AccessParams, Outcome
-from sdrlinkd.sealing import Key, SecurityParams
+from sdrlinkd.sealing import Key, Remembered, SecurityParams
 from sdrlinkd.sealing.testing import Ciphers
 from sdrlinkd.wire import KeyTold, delayed, parse, parse_sealed, read_control_entries
 from tests.laws import law
@@ -128,7 +128,9 @@ def test_entries_that_contradict_themselves_are_refused_although_they_open():
 
 def test_a_clear_pdu_that_comes_back_stays_readable():
     """The KEY record of a robot with another key, in a burst that was late."""
-    team = Team(Robot(1, [KEY]), Robot(2, [Key(0, bytes(32))]))
+    other = Key(0, bytes(32))
+    disk = Remembered({other.fingerprint: 0})
+    team = Team(Robot(1, [KEY]), Robot(2, [other], disk=disk))
     outcomes = iter([Outcome.LATE, Outcome.SENT] * 1000)
     team.outcome = lambda: next(outcomes)
     team.run(12.0)
@@ -154,7 +156,7 @@ def test_a_disk_that_does_not_answer_stops_sealing_and_nothing_else():
         team.run(1.0)
     report = robot.link.report(robot.clock(team.now))
     assert "the disk does not take the numbers" in report.security.halted
-    (floor,) = robot.disk.floors.values()
+    floor = robot.disk.floors[KEY.fingerprint]
     mine = [parse_sealed(data, SIZE).ticks for _, src, data in team.on_air if src == 1]
     assert max(mine) < floor
     assert robot.link.audit() == []

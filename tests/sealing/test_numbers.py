@@ -19,6 +19,10 @@ events = st.one_of(
     st.tuples(st.just("anew"), st.none()),
     st.tuples(st.just("restart"), st.sampled_from([[KEY], [NEXT], [KEY, NEXT]])),
     st.tuples(st.just("install"), st.sampled_from([[KEY], [NEXT], [KEY, NEXT], [NEXT, KEY]])),
+    st.tuples(
+        st.just("lose"),
+        st.tuples(st.sampled_from([[KEY], [NEXT], [KEY, NEXT]]), st.booleans(), st.booleans()),
+    ),
 )
 
 
@@ -31,6 +35,10 @@ def test_no_number_is_used_twice(script):
         machine.do(*event)
     machine.disk_is = "works"
     machine.do("restart", [KEY, NEXT])
+    machine.is_synchronized = True
+    for _ in range(2):
+        machine.do("time", 25.0)
+    machine.write()
     before = len(machine.used)
     machine.do("send", 10)
     assert len(machine.used) == before + 10
@@ -54,7 +62,7 @@ def test_a_full_disk_stops_sealing_before_the_floor_and_says_so():
     robot = team.robots[1]
     team.run(1.0)
     robot.disk_works = False
-    (floor,) = robot.disk.floors.values()
+    floor = robot.disk.floors[KEY.fingerprint]
     team.run(floor / 32 + 5)
     report = robot.link.report(robot.clock(team.now)).security
     assert "cannot be written to disk: No space left" in report.halted

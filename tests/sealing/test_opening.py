@@ -27,7 +27,8 @@ DAY_S = 86_400
 
 def made(own_id=1, keys=(KEY,), floor=0, **params):
     """A robot of which the disk knows nothing new."""
-    disk = Remembered({KEY.fingerprint: floor} if floor else {}, {}, KEY.fingerprint)
+    floors = {KEY.fingerprint: floor, NEXT.fingerprint: 0}
+    disk = Remembered(floors, {}, KEY.fingerprint)
     params = SecurityParams(mode="seal", **params)
     new = Sealing(own_id, SIZE, params, list(keys), disk, lambda n: bytes([own_id]) * n)
     new.look(0.0)
@@ -135,7 +136,7 @@ def test_what_does_not_open_is_refused_by_name():
     assert refusal(two, data, 1.0) == "rx_dup"
     assert refusal(two, one.seal(pdu(2), 1.0)[:-1], 1.0) == "rx_short"
     assert refusal(two, later.seal(pdu(2), 1.0), 1.0) == "sec_unknown_kid"
-    assert two.key_due_at == 1.0
+    assert two.clear_due_at == 1.0
     unknown = "sec_unknown_kid"
     for seq, dst, reason in ((3, 255, unknown), (4, 2, unknown), (5, 3, "rx_not_for_us")):
         assert refusal(two, later.seal(pdu(seq, dst=dst), 1.5), 1.5) == reason

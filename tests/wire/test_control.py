@@ -18,10 +18,12 @@ from sdrlinkd.wire import (
     Clock,
     Contact,
     Flows,
+    FoundNumbers,
     Frame,
     Grant,
     KeyTold,
     LinkReport,
+    LostNumbers,
     Lsa,
     Met,
     Need,
@@ -70,6 +72,8 @@ NEED = {
     21: 2,
     22: 3,
     23: 5,
+    27: 13,
+    28: 17,
 }
 
 octet = st.integers(0, 255)
@@ -94,6 +98,20 @@ records = st.one_of(
         ),
     ),
     st.builds(KeyTold, st.integers(0, 3), st.booleans(), st.binary(min_size=4, max_size=4)),
+    st.builds(
+        LostNumbers,
+        st.integers(0, 3),
+        st.binary(min_size=4, max_size=4),
+        st.binary(min_size=8, max_size=8),
+    ),
+    st.builds(
+        FoundNumbers,
+        octet,
+        st.binary(min_size=8, max_size=8),
+        st.integers(0, 3),
+        st.integers(0, (1 << 30) - 1),
+        st.none() | st.integers(0, (1 << 32) - 2),
+    ),
     st.builds(
         Clock,
         u16,
@@ -366,6 +384,16 @@ def test_any_bytes_are_records_or_refused():
         Wanted(256, b""),
         Wanted(0, bytes(255)),
         KeyTold(0, False, bytes(3)),
+        LostNumbers(4, bytes(4), bytes(8)),
+        LostNumbers(0, bytes(3), bytes(8)),
+        LostNumbers(0, bytes(4), bytes(7)),
+        FoundNumbers(256, bytes(8), 0, 0, None),
+        FoundNumbers(0, bytes(9), 0, 0, None),
+        FoundNumbers(0, bytes(8), 4, 0, None),
+        FoundNumbers(0, bytes(8), 0, 1 << 30, None),
+        FoundNumbers(0, bytes(8), 0, -1, None),
+        FoundNumbers(0, bytes(8), 0, 0, (1 << 32) - 1),
+        FoundNumbers(0, bytes(8), 0, 0, -1),
     ],
     ids=str,
 )
@@ -400,3 +428,18 @@ def refused(payload):
 def test_digest_of_another_length(size):
     with pytest.raises(ValueError, match="digest"):
         build_records([RegistryDigest(bytes(size), b"")])
+
+
+def test_golden_records_about_lost_numbers():
+    """Octets by hand, from the tables of the wire document."""
+    number = bytes(range(8))
+    for record, octets in (
+        (LostNumbers(2, bytes.fromhex("c0ffee11"), number), "1b0d 02 c0ffee11 0001020304050607"),
+        (
+            FoundNumbers(7, number, 2, 100_000, 86_400 * 32),
+            "1c11 07 0001020304050607 800186a0 002a3000",
+        ),
+        (FoundNumbers(7, number, 0, 0, None), "1c11 07 0001020304050607 00000000 ffffffff"),
+    ):
+        assert build_records([record]) == bytes.fromhex(octets)
+        assert parse_records(bytes.fromhex(octets)) == [record]

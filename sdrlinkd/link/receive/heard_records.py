@@ -10,10 +10,12 @@ from sdrlinkd.link.topics import HeardTopics
 from sdrlinkd.wire import (
     Beacon,
     Contact,
+    FoundNumbers,
     Frame,
     Grant,
     KeyTold,
     LinkReport,
+    LostNumbers,
     Parity,
     Pdu,
     Receipt,
@@ -25,7 +27,7 @@ from sdrlinkd.wire import (
     Wanted,
 )
 
-_ELSEWHERE = (Parity, Stamp, Contact, KeyTold)
+_ELSEWHERE = (Parity, Stamp, Contact, KeyTold, LostNumbers, FoundNumbers)
 """Records that others take: the inbox, and sealing."""
 
 RECIPROCAL_DB = 15.0

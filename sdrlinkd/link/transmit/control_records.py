@@ -113,14 +113,14 @@ class ControlRecords:
     @property
     def due_at(self) -> float:
         """Time from which a PDU with only records may be sent."""
-        due_at = min(self._beacons.due_at, self._piggyback.due_at, self._sealing.key_due_at)
+        due_at = min(self._beacons.due_at, self._piggyback.due_at, self._sealing.clear_due_at)
         if self._asking.alone_at < inf:
             due_at = min(due_at, self._asking.alone_at)
         return min(due_at, self._clock_alone_at) if self._n_others else due_at
 
     def is_due(self, start: float) -> bool:
         """Whether a waiting record gets its own PDU at `start`."""
-        return min(self._piggyback.due_at, self._sealing.key_due_at) <= start
+        return min(self._piggyback.due_at, self._sealing.clear_due_at) <= start
 
     def tells_schedule(self, start: float) -> bool:
         """Whether a burst at `start` may hold the schedule, whose phase depends on the start."""
@@ -232,11 +232,11 @@ class ControlRecords:
             part = len(build_records([record])) / max(1, self._room)
             self._air_budget.spend((1 + self._n_others) * part * pdu_s, now, is_bounded=True)
 
-    def clear_key(self, start: float) -> BuiltPdu | None:
-        """A PDU in the clear with the KEY record that is due at `start`, if one is."""
-        if start < self._sealing.key_due_at:
+    def told_in_clear(self, start: float) -> BuiltPdu | None:
+        """A PDU in the clear with the record that is due at `start`, if one is."""
+        if start < self._sealing.clear_due_at:
             return None
-        told = self._sealing.clear_key(start)
+        told = self._sealing.told_in_clear(start)
         entry = Entry(CONTROL_TOPIC_ID, 0, 0, 1, build_records([told]))
         pdu = Pdu(0, False, self._own_id, BROADCAST, 0, 1, [entry])
         return BuiltPdu(build(pdu, self._clear_size), [], Qos.DEFAULT)
@@ -265,6 +265,9 @@ class ControlRecords:
         if now >= self._sealing.contact_due_at:
             contact, alone_at = self._sealing.contact(now, self._room)
             self._piggyback.put(contact, self._alone_from(alone_at))
+        for found in self._sealing.found(now):
+            key = RecordType.FOUND, found.node
+            self._piggyback.put_as(key, found, self._alone_from(now + PATIENCE_S))
 
     def _offer_topics(self, now: float) -> None:
         self._told_version = self._teller.topics.version

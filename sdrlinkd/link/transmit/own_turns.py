@@ -121,7 +121,7 @@ class OwnTurns:
             if built or not access.plans:
                 self._only_told = False
                 return built, 0
-        number, key = composer.take_number(), records.clear_key(start)
+        number, key = composer.take_number(), records.told_in_clear(start)
         n_records = 1 + (key is not None)
         built = composer.fill(start, allowance.fewer(n_records), is_mixed=True)
         length_s = airtime_s(len(built) + n_records)

@@ -192,7 +192,7 @@ class BurstScheduler:
             turns = self._turns
         sealing = self._sealing
         if sealing.is_on and not self._may_seal(start, MAX_PDUS):
-            return None
+            return self._in_the_clear(slot, airtime_s(rate.lowest, 1))
         allowance = self._allowance(
             slot, mcs, opportunity, Qos.DEFAULT if start >= records_due_at else None
         )
@@ -455,6 +455,26 @@ class BurstScheduler:
         self._number += 1
         return burst._replace(number=self._number)
 
+    def _in_the_clear(self, slot: Slot, length_s: float) -> Burst | None:
+        """A burst of a PDU in the clear, if one is due where nothing can be sealed."""
+        start, records = slot.start, self._control_records
+        asks = self._sealing.is_lost and length_s <= slot.end - start
+        built = records.told_in_clear(start) if asks else None
+        if built is None:
+            return None
+        self._control_airtime_s += length_s
+        records.told_alone(start)
+        self._spend(length_s, [built.qos])
+        self._access.sent(start + length_s, None)
+        ready_at, self._ready_at = self._ready_at or start, None
+        self._number += 1
+        return Burst(
+            [built.data], [[]], [built.qos], self._rate.lowest, Qos.DEFAULT, start,
+            max(start, slot.late_end - length_s), length_s, self._number,
+            first_start=start, n_records=1, ready_at=ready_at, planned_start=start,
+            inner=[b""], numbers=[self._composer.next_number],
+        )  # fmt: skip
+
     def _pulse(self, start: float, qos: Qos) -> Burst:
         """A pulse of energy, by which the access policy tells that we have something to send."""
         self._number += 1
@@ -489,7 +509,7 @@ class BurstScheduler:
                 return built, 0
         first = [] if bid is None or built else [bid.record]
         alone = composer.fill_with_records(start, first)
-        key = records.clear_key(start) if len(built) + len(alone) < MAX_PDUS else None
+        key = records.told_in_clear(start) if len(built) + len(alone) < MAX_PDUS else None
         if key is not None:
             alone.append(key)
         return built + alone, len(alone)
