@@ -65,6 +65,7 @@ CONSTANTS: dict[str, tuple[ModuleType, str]] = {
     "loopback_max_behind_s": (loopback, "MAX_BEHIND_S"),
     "hub_look_after_ms": (hub, "LOOK_AFTER_MS"),
     "hub_answer_ms": (radio, "ANSWER_MS"),
+    "hub_refused_s": (radio, "REFUSED_S"),
     "presence_ask_s": (presence, "ASK_S"),
     "presence_quiet_s": (presence, "QUIET_S"),
     "real_time_ask_s": (real_time, "ASK_S"),

@@ -38,13 +38,15 @@ from backends.outstanding import answered
 
 ANSWER_MS = 5000
 INFINITE = float("inf")
+REFUSED_S = 2.0
+"""Time in s after which a hub that has refused is asked again."""
 
 
 class EtherRadio:
     """Joins the hub at `hub` as robot `node`; `who` names it to people.
 
     When the hub is gone, the stream pauses until the hub returns; the missed samples become a gap.
-    `patience` says what `open` does without a hub.
+    `patience` says what `open` does without a hub, or with one that refuses.
     """
 
     def __init__(
@@ -52,7 +54,7 @@ class EtherRadio:
     ) -> None:
         self._hub = hub
         self._clock = HubClock(hub.is_remote)
-        self._waits = patience is not Patience.NONE
+        self._patience = patience
         self._node = node
         self._who = who
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -207,10 +209,20 @@ class EtherRadio:
 
     def _ask(self) -> None:
         """Join for the first time, before there are blocks; runs in a thread."""
-        within_s = INFINITE if self._waits else 1e-3 * ANSWER_MS
+        within_s = INFINITE if self._patience is not Patience.NONE else 1e-3 * ANSWER_MS
         try:
-            self._welcome = join(self._down, self._hello(), self._hub, within_s, self._closing)
-            self._is_welcome = True
+            while True:
+                try:
+                    self._welcome = join(
+                        self._down, self._hello(), self._hub, within_s, self._closing
+                    )
+                except RefusalError:
+                    # Another hub, or another radio there, may change that.
+                    if self._patience is not Patience.REPLUGGED or self._closing.wait(REFUSED_S):
+                        raise
+                else:
+                    self._is_welcome = True
+                    return
         finally:
             self._is_idle.set()
 

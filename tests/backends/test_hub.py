@@ -15,6 +15,7 @@ from backends import (
     EtherRadio,
     HubWatch,
     JammerParams,
+    Patience,
     RadioParams,
     Tuning,
     TxBurst,
@@ -186,6 +187,28 @@ async def test_a_radio_that_finds_no_hub_waits_until_there_is_one(tmp_path):
         await opening
         assert len(await take(radio.blocks(), N)) >= 1
         await radio.close()
+
+
+async def test_a_radio_that_was_refused_asks_again_and_again(tmp_path, monkeypatch):
+    """Within one opening: nobody starts a process for each question."""
+    monkeypatch.setattr(*CONSTANTS["hub_refused_s"], 0.05)
+    radio = EtherRadio(hub_in(tmp_path), 1, "the second", Patience.REPLUGGED)
+    with serving(tmp_path):
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the first")):
+            opening = asyncio.ensure_future(radio.open(TUNING))
+            await asyncio.wait((opening,), timeout=0.3)
+            assert not opening.done()
+        await opening
+        assert ask(tmp_path).nodes == {1: "the second"}
+        await radio.close()
+        # Whoever is not patient is told at once; whoever is closed stops asking.
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the third")):
+            again = EtherRadio(hub_in(tmp_path), 1, "the fourth", Patience.REPLUGGED)
+            opening = asyncio.ensure_future(again.open(TUNING))
+            await asyncio.wait((opening,), timeout=0.1)
+            await again.close()
+            with pytest.raises(BackendError, match="already on this channel"):
+                await opening
 
 
 async def test_a_folder_has_one_hub(tmp_path):
