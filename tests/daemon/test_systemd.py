@@ -19,7 +19,8 @@ from tests.machine import lacks
 
 ROOT = Path(__file__).parents[2]
 UNITS = [ROOT / "systemd" / name for name in ("sdrlinkd.service", "sdrlinkd@.service")]
-GATEWAY = ROOT / "systemd" / "sdrlink-gateway.service"
+BESIDE = sorted((ROOT / "systemd").glob("sdrlink-*.service"))
+"""Those of programs that run beside the daemon."""
 # What may differ between the units for one node and for several.
 OF_THE_NODE = {"ExecStart", "RuntimeDirectory", "StateDirectory"}
 WATCHDOG_S = 0.3
@@ -29,7 +30,7 @@ needs_systemd_analyze = pytest.mark.skipif(
     shutil.which("systemd-analyze") is None,
     reason=lacks("systemd"),
 )
-each_unit = pytest.mark.parametrize("unit", [*UNITS, GATEWAY], ids=lambda unit: unit.name)
+each_unit = pytest.mark.parametrize("unit", [*UNITS, *BESIDE], ids=lambda unit: unit.name)
 
 
 # The units.
@@ -67,6 +68,30 @@ def test_both_units_are_hardened_alike():
     one, several = (service_lines(unit) for unit in UNITS)
     assert one == several
     assert len(one) > 40
+
+
+@each_unit
+def test_no_unit_leaves_a_core_dump_or_files_for_others(unit: Path):
+    lines = service_lines(unit)
+    assert "LimitCORE=0" in lines
+    assert {"UMask=0007", "UMask=0077"} & set(lines)
+
+
+def test_what_runs_beside_the_daemon_is_hardened_alike_and_serves_this_computer_alone():
+    names = [unit.name for unit in BESIDE]
+    assert names == [
+        f"sdrlink-{each}.service" for each in ("exporter", "foxglove", "gateway", "web")
+    ]
+    hardening = {unit.read_text().split("AmbientCapabilities=")[1] for unit in BESIDE}
+    assert len(hardening) == 1
+    for unit in BESIDE:
+        lines = service_lines(unit)
+        if "gateway" in unit.name:
+            # Its routers are elsewhere, and it proves itself to them.
+            continue
+        assert {"DynamicUser=yes", "IPAddressDeny=any", "IPAddressAllow=localhost"} <= set(lines)
+        (program,) = [each for each in unit.read_text().splitlines() if "ExecStart=" in each]
+        assert "exporter" in unit.name or " --token " in program
 
 
 @pytest.mark.slow

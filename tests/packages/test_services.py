@@ -2,6 +2,9 @@
 
 import re
 import shutil
+from urllib.error import HTTPError
+from urllib.parse import quote
+from urllib.request import urlopen
 
 import pytest
 import zenoh
@@ -15,6 +18,8 @@ from tests.waiting import wait_for
 CONFIG = "/etc/sdrlinkd/sdrlinkd.toml"
 PACKAGE = "/root/sdrlinkd.deb"
 ALL = ("sdrlinkd", "sdrlinkd@two", "sdrlink-gateway")
+BESIDE = ("sdrlink-web", "sdrlink-foxglove", "sdrlink-exporter")
+TOKEN = "as agreed"
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +74,35 @@ def test_the_gateway_answers_from_behind_its_hardening(robot, endpoint):
 
     wait_until_active(robot, ["sdrlink-gateway"])
     wait_for(lambda: any('"has_daemon":true' in each for each in answers()), 30)
+
+
+def test_page_foxglove_and_exporter_answer_from_behind_their_hardening(robot):
+    """Each with a user of its own; the first two to whoever has the token."""
+    ports = {unit: int(free_endpoint().rpartition(":")[2]) for unit in BESIDE}
+    for unit, port in ports.items():
+        name = unit.removeprefix("sdrlink-")
+        variable = f"SDRLINK_{name.upper()}"
+        robot.run(
+            f"printf '{variable}_OPTIONS=--listen 127.0.0.1:{port}\n{variable}_TOKEN={TOKEN}\n'"
+            f" > /etc/sdrlinkd/{name}.env; chmod 600 /etc/sdrlinkd/{name}.env"
+        )
+    robot.run(f"systemctl enable --now {' '.join(BESIDE)}")
+    wait_until_active(robot, BESIDE)
+
+    def got(unit, query=""):
+        try:
+            with urlopen(f"http://127.0.0.1:{ports[unit]}/{query}", timeout=5) as answer:
+                return answer.status, answer.read().decode()
+        except HTTPError as error:
+            return error.code, ""
+        except OSError:
+            return 0, ""
+
+    wait_for(lambda: "sdrlink_up{" in got("sdrlink-exporter", "metrics")[1], 60)
+    wait_for(lambda: got("sdrlink-web", "?token=" + quote(TOKEN))[0] == 200, 60)
+    assert got("sdrlink-web")[0] in (401, 403)
+    wait_for(lambda: got("sdrlink-foxglove")[0] in (401, 403), 60)
+    robot.run(f"systemctl disable --now {' '.join(BESIDE)}")
 
 
 def test_a_reload_changes_nothing_but_what_it_reads(robot):

@@ -31,16 +31,20 @@ def ask(daemon, verb, **arguments):
         return control.ask(verb, arguments)
 
 
-def transforms(*children):
-    """A TFMessage as CDR."""
-    octets = struct.pack("<I", len(children))
-    for child in children:
-        octets += bytes(-len(octets) % 4) + struct.pack("<iI", 7, 8)
-        for name in ("base_link", child):
-            text = name.encode() + b"\0"
-            octets += bytes(-len(octets) % 4) + struct.pack("<I", len(text)) + text
-        octets += bytes(-len(octets) % 8) + struct.pack("<7d", 1, 2, 3, 0, 0, 0, 1)
-    return (b"\0\1\0\0" + octets).hex()
+def transforms(child):
+    """A TFMessage in CDR with the frame `child`, of at most 7 characters.
+
+    No package with its type can be installed here, but the daemon knows it. So the same octets are
+    a CARRIER, too: the label of its dimension reaches from the nanoseconds to the end of the parent
+    frame, and the length of its data is the low half of x.
+    """
+    parent, frame = b"base_link\0", child.encode() + b"\0"
+    assert len(frame) <= 8
+    head = struct.pack("<I", 1) + struct.pack("<iI", 8 + len(parent), 8)
+    head += struct.pack("<I", len(parent)) + parent
+    head += bytes(-len(head) % 4) + struct.pack("<I", len(frame)) + frame
+    rest = struct.pack("<I6d", 0x3FF00000, 2, 3, 0, 0, 0, 1)
+    return (b"\0\1\0\0" + head + bytes(-len(head) % 8) + struct.pack("<I", len(rest)) + rest).hex()
 
 
 class Robot:

@@ -55,6 +55,12 @@ def test_what_comes_from_the_air_is_published_only_under_a_type_that_it_is(
         out.send("/wrong", b"\0\1\0\0\2\0\0\0a\0")
         message = empty(kind)
         message.header.frame_id = "base"
+        # A length that is none, and a text that ends a node written in Python.
+        at = to_cdr(message, kind).index(b"base")
+        for where, what in ((at - 4, b"\xff\xff\xff\x7f"), (at, b"\xff\xfe")):
+            hostile = bytearray(to_cdr(message, kind))
+            hostile[where : where + len(what)] = what
+            out.send(topic, bytes(hostile))
         sent_ns = time.time_ns()
 
         def is_restamped():
@@ -72,7 +78,7 @@ def test_what_comes_from_the_air_is_published_only_under_a_type_that_it_is(
         told = json.loads(two.node.last(topic="/link/topics")[0])
         return [each["dropped"] for each in told if each["state"] == "rx_bad_cdr"]
 
-    wait_for(lambda: n_bad() == [2], WAIT_S)
+    wait_for(lambda: n_bad() == [4], WAIT_S)
     assert two.node.count(topic="/robot_1/wrong") == 0
 
 
@@ -143,7 +149,7 @@ def test_transforms_of_others_are_merged_and_never_go_back(start_daemon, start, 
     # The node and the bridge, which takes it for the other robot.
     matched(one, "/tf", n=2)
     matched(two, "/tf", n=2)
-    sent = {one: transforms("r1/laser"), two: transforms("r2/laser")}
+    sent = {one: transforms("r1/scan"), two: transforms("r2/scan")}
     for robot in (one, two):
         robot.node.raw(topic="/tf", octets=sent[robot])
     for robot in (one, two):
@@ -164,18 +170,18 @@ def test_merging_at_run_time_brings_what_was_latched_before(start_daemon, start,
     one = Robot(start, start_daemon(config(hub, 1))).bridged()
     two = Robot(start, start_daemon(config(hub, 2))).bridged()
     one.node.pub(topic="/tf_static", type=CARRIER, latched=True)
-    one.node.raw(topic="/tf_static", octets=transforms("r1/laser"))
+    one.node.raw(topic="/tf_static", octets=transforms("r1/scan"))
     two.node.sub(topic="/robot_1/tf_static", type=CARRIER, latched=True)
     wait_for(lambda: two.node.count(topic="/robot_1/tf_static") == 1, WAIT_S)
     two.node.sub(topic="/tf_static", type=CARRIER, latched=True)
     # The robot has static transforms of its own.
     two.node.pub(topic="/tf_static", type=CARRIER, latched=True)
-    two.node.raw(topic="/tf_static", octets=transforms("r2/laser"))
+    two.node.raw(topic="/tf_static", octets=transforms("r2/scan"))
     assert two.node.set(node="sdrlink_bridge", name="tf.merge", value=True)[0]
     wait_for(lambda: two.node.count(topic="/tf_static") == 2, WAIT_S)
     # A demand that comes later finds the robot's own transforms only.
     with Subscriber("/rx_robot_2/tf_static", directory=one.daemon.directory) as heard:
-        assert heard.receive(WAIT_S).payload.startswith(bytes.fromhex(transforms("r2/laser")))
+        assert heard.receive(WAIT_S).payload.startswith(bytes.fromhex(transforms("r2/scan")))
         assert heard.receive(2.0) is None
 
 

@@ -5,16 +5,12 @@ import sys
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rosbags.interfaces import Nodetype
 from sdrlink_ros.echoes import Echoes
-from sdrlink_ros.kinds import UnknownTypeError, kind, least_size
+from sdrlink_ros.kinds import UnknownTypeError, kind
 from sdrlink_ros.names import Names, command_for, is_command, left_out, matches, unused
 from sdrlink_ros.offer import Offer
 from sdrlink_ros.routes import decide
 from sdrlink_ros.settings import Settings
-
-from sdrlinkd.adapters import empty, to_cdr
-from sdrlinkd.adapters.testing import ros2_types
 
 ODOM, IMAGE = "nav_msgs/msg/Odometry", "sensor_msgs/msg/Image"
 TF = "tf2_msgs/msg/TFMessage"
@@ -114,39 +110,6 @@ def test_patterns_that_match_nothing_name_the_nearest():
     assert unused(["/odmo", "/o*"], ["/odom", "/imu"]) == {"/odmo": ["/odom"]}
     assert matches("/odom", ["odom"])
     assert left_out("/odom", ODOM, [], []) == "not named by the parameter allow"
-
-
-def fields_of(name):
-    """A type's fields in the words of rclpy, from an independent library."""
-    package, _, last = name.partition("/")
-    found = {}
-    for field, (node, inner) in ros2_types().fielddefs[f"{package}/msg/{last}"][1]:
-        found[field] = words(node, inner)
-    return found
-
-
-def words(node, inner):
-    if node == Nodetype.NAME:
-        return inner.replace("/msg/", "/")
-    if node == Nodetype.BASE:
-        plain = {"float32": "float", "float64": "double", "bool": "boolean"}
-        return plain.get(inner[0], inner[0])
-    (item, length) = inner
-    text = words(*item)
-    return f"{text}[{length}]" if node == Nodetype.ARRAY else f"sequence<{text}>"
-
-
-@pytest.mark.slow
-def test_no_message_is_smaller_than_its_types_least_size():
-    kinds = sorted(each for each in ros2_types().fielddefs if "/msg/" in each)
-    assert len(kinds) > 100
-    for each in kinds:
-        package, _, last = each.split("/")
-        least = least_size(fields_of(f"{package}/{last}"), fields_of)
-        smallest = len(to_cdr(empty(each), each)) - 4
-        assert least <= smallest, each
-    assert least_size(fields_of("nav_msgs/Odometry"), fields_of) > 690
-    assert least_size(fields_of("geometry_msgs/Twist"), fields_of) == 48
 
 
 @pytest.mark.parametrize("name", ["no_such_msgs/msg/Thing", "this/msg/Thing", "", "a", "../b/c"])

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from sdrlink_ros import qos
-from sdrlink_ros.kinds import Kind, UnknownTypeError, is_cdr, kind
+from sdrlink_ros.kinds import Kind, UnknownTypeError, kind
 from sdrlink_ros.names import Names
 from sdrlink_ros.outgoing import Spec
 from sdrlinkd.calls import (
@@ -89,7 +89,7 @@ class Outlets:
             while len(self._status) > MOST_STATUSES:
                 self._status.popitem(last=False)
         publisher, kind_ = self._publishers.get((here, inner), (None, None))
-        if publisher is not None and kind_ is not None and is_cdr(cdr, kind_.least):
+        if publisher is not None and kind_ is not None and kind_.fits(cdr):
             publisher.publish(cdr)
 
     def _open(self, name: str, inner: str, kind_: Kind) -> None:
@@ -97,7 +97,7 @@ class Outlets:
         publisher = self._node.create_publisher(kind_.message, _topic(name, inner), profile)
         self._publishers[name, inner] = publisher, kind_
         last = self._status.get(name, b"")
-        if inner == STATUS and is_cdr(last, kind_.least):
+        if inner == STATUS and kind_.fits(last):
             publisher.publish(last)
 
 

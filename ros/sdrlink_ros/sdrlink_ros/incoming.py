@@ -10,7 +10,7 @@ from typing import Any
 
 from sdrlink_ros import graph, qos
 from sdrlink_ros.echoes import Echoes
-from sdrlink_ros.kinds import UnknownTypeError, is_cdr, kind
+from sdrlink_ros.kinds import UnknownTypeError, kind
 from sdrlink_ros.names import Names, command_for, is_command, matches
 from sdrlink_ros.outlet import LINGER_S, Outlet, Source, restamped
 from sdrlink_ros.sayings import Sayings
@@ -276,7 +276,7 @@ class Incoming:
             self.dropped["rx_unknown_topic"] += 1
         elif message.type != outlet.kind.name:
             self.dropped["rx_other_type"] += 1
-        elif not is_cdr(cdr, outlet.kind.least):
+        elif not outlet.kind.fits(cdr):
             self.dropped["rx_bad_cdr"] += 1
         else:
             if outlet.is_known(message):

@@ -1,4 +1,4 @@
-"""Message types by name: their classes, least sizes, and whether they begin with a header."""
+"""Message types by name: their classes, what fits them, and whether they begin with a header."""
 
 import importlib
 import importlib.util
@@ -8,14 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-_SIZES = {
-    "boolean": 1, "octet": 1, "byte": 1, "char": 1, "uint8": 1, "int8": 1, "uint16": 2, "int16": 2,
-    "wchar": 2, "uint32": 4, "int32": 4, "float": 4, "uint64": 8, "int64": 8, "double": 8,
-    "long double": 16,
-}  # fmt: skip
-MOST_ALIGNED = 8
-ENCAPSULATION = 4
-_LENGTH = 4
+from sdrlink_ros.cdr import Fields, Fits, fits
+
 FOLDERS = ("msg", "srv", "action")
 _NAME = re.compile(r"([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9_]*)")
 # The types that make an action, by the end of their names.
@@ -27,8 +21,6 @@ _PARTS: dict[str, Callable[[Any], Any]] = {
     "SendGoal": lambda action: action.Impl.SendGoalService,
     "GetResult": lambda action: action.Impl.GetResultService,
 }
-_ARRAY = re.compile(r"(.+)\[(\d+)\]")
-_TEXT = re.compile(r"w?string(<\d+>)?")
 
 
 class UnknownTypeError(Exception):
@@ -36,24 +28,21 @@ class UnknownTypeError(Exception):
 
 
 class Kind(NamedTuple):
-    """A message type: `least` is the smallest size of its CDR in octets."""
+    """A message type; `fits` tells whether octets are CDR of it."""
 
     name: str
     message: Any
-    least: int
+    fits: Fits
     has_header: bool
 
 
 class ServiceKind(NamedTuple):
-    """A service type; `least_request` and `least_response` are the smallest sizes of their CDR."""
+    """A service type; `fits_…` tell whether octets are CDR of its request, and of its response."""
 
     name: str
     service: Any
-    least_request: int
-    least_response: int
-
-
-Fields = dict[str, str]
+    fits_request: Fits
+    fits_response: Fits
 
 
 @cache
@@ -64,7 +53,7 @@ def kind(name: str) -> Kind:
         raise _unknown(name)
     fields = message.get_fields_and_field_types()
     has_header = next(iter(fields.values()), "") == "std_msgs/Header"
-    return Kind(name, message, ENCAPSULATION + least_size(fields, _fields_of), has_header)
+    return Kind(name, message, fits(fields, _fields_of), has_header)
 
 
 @cache
@@ -73,55 +62,9 @@ def service_kind(name: str) -> ServiceKind:
     service = _load(name)
     if not hasattr(service, "Request"):
         raise _unknown(name)
-    least = (
-        ENCAPSULATION + least_size(part.get_fields_and_field_types(), _fields_of)
-        for part in (service.Request, service.Response)
-    )
-    return ServiceKind(name, service, *least)
-
-
-def is_cdr(octets: bytes, least: int) -> bool:
-    """Whether octets from the air can be CDR of a type whose least size is `least`."""
-    return len(octets) >= least and octets[:2] in (b"\0\0", b"\0\1")
-
-
-def least_size(fields: Fields, of: Callable[[str], Fields]) -> int:
-    """The smallest size of a message with these fields in CDR, without its encapsulation.
-
-    `of` gives the fields of a nested type.
-    """
-    at, _ = _struct(fields, of, 0, is_exact=True)
-    return at
-
-
-def _struct(
-    fields: Fields, of: Callable[[str], Fields], at: int, is_exact: bool
-) -> tuple[int, bool]:
-    if not fields:
-        return at + 1, is_exact
-    for each in fields.values():
-        at, is_exact = _field(each, of, at, is_exact)
-    return at, is_exact
-
-
-def _field(text: str, of: Callable[[str], Fields], at: int, is_exact: bool) -> tuple[int, bool]:
-    """(end of a field that begins at `at`, whether the end of each such field is there).
-
-    Behind a field of variable size the alignment is not known, so no padding is counted.
-    """
-    if (size := _SIZES.get(text)) is not None:
-        return (_aligned(at, size) if is_exact else at) + size, is_exact
-    if text.startswith("sequence<") or _TEXT.fullmatch(text):
-        return (_aligned(at, _LENGTH) if is_exact else at) + _LENGTH, False
-    if (array := _ARRAY.fullmatch(text)) is not None:
-        for _ in range(int(array[2])):
-            at, is_exact = _field(array[1], of, at, is_exact)
-        return at, is_exact
-    return _struct(of(text), of, at, is_exact)
-
-
-def _aligned(at: int, size: int) -> int:
-    return at + -at % min(size, MOST_ALIGNED)
+    parts = (service.Request, service.Response)
+    request, response = (fits(each.get_fields_and_field_types(), _fields_of) for each in parts)
+    return ServiceKind(name, service, request, response)
 
 
 def _fields_of(name: str) -> Fields:

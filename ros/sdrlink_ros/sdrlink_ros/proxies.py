@@ -137,7 +137,7 @@ class Proxies:
         if asked is None:
             return
         proxy, status, body = asked.proxy, ended.status, ended.body
-        if status == Status.OK and len(body) >= proxy.kind.least_response:
+        if status == Status.OK and proxy.kind.fits_response(body):
             response = deserialize_message(body, proxy.kind.service.Response)
             proxy.server.send_response(response, asked.header)
             self._counts["answered"] += 1

@@ -116,7 +116,7 @@ class Servers:
             return
         try:
             client = self._client(name)
-            if len(packet.body) < client.kind.least_request:
+            if not client.kind.fits_request(packet.body):
                 self._answerer.answer(key, Status.OTHER_TYPE, b"", now)
             elif not client.client.service_is_ready():
                 # A client that was made just now has yet to find its server.
