@@ -24,7 +24,6 @@ from sdrlinkd.control import Control
 from sdrlinkd.declaring import Declaring
 from sdrlinkd.descriptors import Descriptors
 from sdrlinkd.errors import ConfigError, ungrouped
-from sdrlinkd.health import Level
 from sdrlinkd.keeping import open_keeping
 from sdrlinkd.link import Link
 from sdrlinkd.modem import Loading, access_words, check_airtime, make_modem
@@ -46,11 +45,6 @@ if TYPE_CHECKING:
 log = logging.getLogger("sdrlinkd")
 
 WATCH_PERIOD_S = 1.0
-LEVELS = {
-    Level.INFO: logging.INFO,
-    Level.WARNING: logging.WARNING,
-    Level.ERROR: logging.ERROR,
-}
 SWITCH_INTERVAL_S = 1e-4
 START_S = 120.0
 """Longest time in s that startup may take, for small computers."""
@@ -263,7 +257,7 @@ async def _watch(notifier: Notifier, node: Node, control: Control) -> None:
         notifier.alive()
         snapshot = node.snapshot(control.requests)
         for line in node.health.look(snapshot):
-            log.log(LEVELS[line.level], "%s", line.text)
+            log.log(line.level, "%s", line.text)
         notifier.status(status_line(snapshot))
         await asyncio.sleep(period_s)
 

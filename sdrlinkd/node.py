@@ -12,7 +12,7 @@ from sdrlinkd import __version__
 from sdrlinkd.airwatch import AirWatch
 from sdrlinkd.bus import Bus, Ingress
 from sdrlinkd.config import Setup
-from sdrlinkd.health import Health, line_told
+from sdrlinkd.health import Health, Level, Line, line_told
 from sdrlinkd.hostclock import HostClock
 from sdrlinkd.keeping import Keeping
 from sdrlinkd.link import (
@@ -295,10 +295,13 @@ class Node:
                 continue
             name = self._setup.republished(src, topic.name)
             if (stop := self._types.stop(topic)) is None:
-                log.error("%s: silent, but no stop message can be made for its type", name)
+                done, level = "but no stop message can be made for its type", Level.ERROR
             else:
-                log.warning("%s: silent, published the stop message", name)
+                done, level = "published the stop message", Level.WARNING
                 self.bus.publish_stop(src, topic, stop)
+            line = Line(name, level, f"{name}: silent, {done}")
+            if self.health.passed(line, time.monotonic() - self._started_at) is not None:
+                log.log(level, "%s", line.text)
 
     def audit(self) -> list[str]:
         """Discrepancies in the ledger, as sentences; empty when it adds up."""

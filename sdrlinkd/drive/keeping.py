@@ -49,7 +49,7 @@ class Chronicle:
             self._say(level, ": ".join([verdict.level, *verdict.reasons[:1]]), now_ns)
             self._level = verdict.level
         for line in self._health.look(snapshot):
-            self._say(line.level.value, line.text, now_ns)
+            self._say(line.level.name.lower(), line.text, now_ns)
 
     def end(self) -> None:
         """Write the last report, if it came too soon after the one before."""

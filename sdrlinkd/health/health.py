@@ -34,3 +34,10 @@ class Health:
             lines.append(line._replace(text=line.text + more))
         self._lately.note(snapshot)
         return lines
+
+    def passed(self, line: Line, now: float) -> Line | None:
+        """`line` on an event at `now`, unless there were too many on its subject.
+
+        The last one of those that are held back is told by `look`, with their number.
+        """
+        return self._limiter.take(line.subject, line, now)

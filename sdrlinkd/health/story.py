@@ -1,7 +1,7 @@
 """Log lines on what has changed from one snapshot to the next."""
 
 from collections.abc import Iterator, Sequence
-from enum import Enum
+from enum import IntEnum
 from typing import NamedTuple
 
 from sdrlinkd.health.lately import Lately, shed_by_topic
@@ -10,12 +10,12 @@ from sdrlinkd.health.words import pdu_link_name, span
 from sdrlinkd.reports import NeighborReport, Snapshot, TopicReport
 
 
-class Level(Enum):
-    """Urgency of a line, as a priority of journald."""
+class Level(IntEnum):
+    """Urgency of a line, as the logging module numbers it."""
 
-    INFO = "info"
-    WARNING = "warning"
-    ERROR = "error"
+    INFO = 20
+    WARNING = 30
+    ERROR = 40
 
 
 class Line(NamedTuple):

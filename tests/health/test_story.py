@@ -1,8 +1,9 @@
 """The log of a drive: each event once, in order, and never a flood."""
 
 import itertools
+import logging
 
-from sdrlinkd.health import Health, Level
+from sdrlinkd.health import Health, Level, Line
 from sdrlinkd.reports import ClockReport
 from tests.health.snapshots import robot, snapshot, topic
 
@@ -10,7 +11,9 @@ from tests.health.snapshots import robot, snapshot, topic
 def story(*snapshots):
     """The log entries, as (level, text)."""
     health = Health()
-    return [(line.level.value, line.text) for each in snapshots for line in health.look(each)]
+    return [
+        (line.level.name.lower(), line.text) for each in snapshots for line in health.look(each)
+    ]
 
 
 def test_a_radio_that_comes_late_goes_and_comes_back():
@@ -154,5 +157,19 @@ def test_what_goes_on_and_off_all_day_does_not_fill_the_log():
     )
 
 
-def test_levels_are_those_of_the_journal():
-    assert {level.value for level in Level} == {"info", "warning", "error"}
+def test_events_are_limited_like_changes_and_the_last_one_is_told():
+    health, told = Health(), []
+    for second in range(120):
+        line = Line("/cmd_vel", Level.WARNING, f"silent at {second}")
+        told.append(health.passed(line, float(second)))
+        told += health.look(snapshot(float(second), robots=[]))
+    texts = [line.text for line in told if line is not None and line.subject == "/cmd_vel"]
+    assert texts[:4] == [f"silent at {second}" for second in range(4)]
+    assert len(texts) < 15
+    assert sum("similar lines suppressed" in text for text in texts) > 5
+    assert health.passed(Line("/other", Level.WARNING, "silent"), 120.0) is not None
+
+
+def test_levels_are_those_of_the_logging_module():
+    for level in Level:
+        assert logging.getLevelName(level) == level.name
