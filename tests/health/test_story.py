@@ -11,9 +11,8 @@ from tests.health.snapshots import robot, snapshot, topic
 def story(*snapshots):
     """The log entries, as (level, text)."""
     health = Health()
-    return [
-        (line.level.name.lower(), line.text) for each in snapshots for line in health.look(each)
-    ]
+    lines = [line for each in snapshots for line in health.look(each)]
+    return [(line.level.name.lower(), line.text) for line in lines]
 
 
 def test_a_radio_that_comes_late_goes_and_comes_back():

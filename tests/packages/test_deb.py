@@ -84,7 +84,7 @@ def test_units_find_their_programs_and_wait_for_a_person(installed):
         assert there.read_text() == unit.read_text()
         for program in re.findall(r"(?m)^Exec\w+=(\S+)", unit.read_text()):
             installed.run(f"test -x {program}")
-    assert len(units) == 3
+    assert len(units) == 6
     assert not list((installed.path / "etc/systemd/system").rglob("sdrlink*"))
 
 

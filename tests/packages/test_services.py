@@ -4,7 +4,7 @@ import re
 import shutil
 from urllib.error import HTTPError
 from urllib.parse import quote
-from urllib.request import urlopen
+from urllib.request import HTTPCookieProcessor, build_opener
 
 import pytest
 import zenoh
@@ -91,18 +91,24 @@ def test_page_foxglove_and_exporter_answer_from_behind_their_hardening(robot):
 
     def got(unit, query=""):
         try:
-            with urlopen(f"http://127.0.0.1:{ports[unit]}/{query}", timeout=5) as answer:
+            # The token comes back as a cookie.
+            browser = build_opener(HTTPCookieProcessor())
+            with browser.open(f"http://127.0.0.1:{ports[unit]}/{query}", timeout=5) as answer:
                 return answer.status, answer.read().decode()
         except HTTPError as error:
             return error.code, ""
         except OSError:
             return 0, ""
 
-    wait_for(lambda: "sdrlink_up{" in got("sdrlink-exporter", "metrics")[1], 60)
-    wait_for(lambda: got("sdrlink-web", "?token=" + quote(TOKEN))[0] == 200, 60)
-    assert got("sdrlink-web")[0] in (401, 403)
-    wait_for(lambda: got("sdrlink-foxglove")[0] in (401, 403), 60)
-    robot.run(f"systemctl disable --now {' '.join(BESIDE)}")
+    try:
+        wait_for(lambda: "sdrlink_up{" in got("sdrlink-exporter", "metrics")[1], 60)
+        wait_for(lambda: got("sdrlink-web", "?token=" + quote(TOKEN))[0] == 200, 60)
+        assert got("sdrlink-web")[0] in (401, 403)
+        wait_for(lambda: got("sdrlink-foxglove")[0] in (401, 403), 60)
+    except AssertionError:
+        pytest.fail(robot.answer(f"journalctl -q -n 40 -u {' -u '.join(BESIDE)}"))
+    finally:
+        robot.run(f"systemctl disable --now {' '.join(BESIDE)}")
 
 
 def test_a_reload_changes_nothing_but_what_it_reads(robot):
