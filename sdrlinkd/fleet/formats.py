@@ -92,12 +92,18 @@ class Fate(msgspec.Struct, frozen=True, omit_defaults=True):
     reason: Text = ""
 
 
+class _Any(msgspec.Struct, frozen=True):
+    """An attachment of anybody, read like the others; `gw` is empty unless it has that."""
+
+    gw: msgspec.Raw = msgspec.Raw()
+
+
 _encode = msgspec.msgpack.Encoder().encode
 _passed = msgspec.msgpack.Decoder(Passed)
 _command = msgspec.msgpack.Decoder(Command)
 _claim = msgspec.msgpack.Decoder(Claim)
 _fate = msgspec.msgpack.Decoder(Fate)
-_any = msgspec.msgpack.Decoder(dict[str, object])
+_any = msgspec.msgpack.Decoder(_Any)
 
 
 def encode(told: Passed | Command | Claim | Fate) -> bytes:
@@ -107,7 +113,8 @@ def encode(told: Passed | Command | Claim | Fate) -> bytes:
 
 def is_passed(attachment: bytes | None) -> bool:
     """Whether a message with this attachment comes from a gateway, rather than from an operator."""
-    return "gw" in (_read(_any, attachment) or {})
+    found = _read(_any, attachment)
+    return found is not None and bool(found.gw)
 
 
 def read_passed(attachment: bytes | None) -> Passed | None:

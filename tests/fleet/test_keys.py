@@ -171,3 +171,15 @@ def test_of_two_claims_one_beats_the_other(term, other, its_score, gw):
         one, two = Claim(9, term, 0.5), Claim(gw, far, its_score)
         assert one.beats(two) != two.beats(one)
     assert Claim(gw, (term + 1) % TERMS, -0.5).beats(Claim(9, term, 2))
+
+
+def test_what_a_gateway_puts_is_never_an_operators_command_whatever_else_it_says():
+    told = encode(Passed(7))
+    assert is_passed(told)
+    # A field that nobody knows, with a name that is no text.
+    strange = bytes((told[0] + 1,)) + told[1:] + b"\xa2\xfep\x01"
+    assert read_passed(strange) == Passed(7)
+    assert is_passed(strange)
+    assert not is_passed(encode(Command("ann", 7)))
+    assert not is_passed(b"")
+    assert not is_passed(None)

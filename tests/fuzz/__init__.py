@@ -8,3 +8,9 @@ the format: it keeps checksums, lengths and types true half of the time, so that
 first check. An input that raises anything but the errors that the reader promises is a crash, and
 is kept in `build/fuzz`.
 """
+
+import sys
+from pathlib import Path
+
+# The ROS 2 package is no part of the environment.
+sys.path.insert(0, str(Path(__file__).parents[2] / "ros" / "sdrlink_ros"))

@@ -10,7 +10,10 @@ from random import Random
 
 CRASHES = Path("build") / "fuzz"
 CORPUS = Path(__file__).parent / "corpus"
-LONGEST = {"link": 1024, "config": 8192, "sigmf": 4096, "sealed": 256}
+LONGEST = {
+    "link": 1024, "config": 8192, "sigmf": 4096, "sealed": 256, "foxglove": 16384, "cdr": 4096,
+    "zenoh": 2048, "rmw_zenoh": 2048, "state": 4096,
+}  # fmt: skip
 USUAL = 512
 """Most octets of an input."""
 
@@ -19,7 +22,7 @@ def search(name: str, seconds: int) -> None:
     """Fuzz one target in this process, which libFuzzer ends."""
     import atheris  # only where it runs
 
-    with atheris.instrument_imports(include=["sdrlinkd", "backends"]):
+    with atheris.instrument_imports(include=["sdrlinkd", "backends", "sdrlink_ros"]):
         from tests.fuzz.mutate import mutate
         from tests.fuzz.targets import TARGETS
     found = CRASHES / name

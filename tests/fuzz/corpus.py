@@ -7,13 +7,21 @@ from random import Random
 import numpy as np
 
 from backends.testing import protocol
+from sdrlinkd.adapters import knows, to_cdr
+from sdrlinkd.calls import Kind, Packet
+from sdrlinkd.fleet import Claim, Command, Fate, Passed, encode
+from sdrlinkd.fleet.testing import Attachment, Node, Qos, Role
+from sdrlinkd.keyring import KeyFile, StoredKey, key_file_text
 from sdrlinkd.link import ClockParams, Outcome, RepeatParams
 from sdrlinkd.pdulink import to_gnu_radio
 from sdrlinkd.pdulink.testing import pmt
 from sdrlinkd.wire import build_records
+from tests.fuzz.doors import TYPES as DOOR_TYPES
+from tests.fuzz.doors import a_state
 from tests.fuzz.mutate import RECORDS, Source, one_pdu
-from tests.fuzz.targets import PDU_SIZE
+from tests.fuzz.targets import KEY, PDU_SIZE
 from tests.link.world import make_link, next_burst
+from tests.ros.types import made
 
 CORPUS = Path(__file__).parent / "corpus"
 SHIPPED = Path(__file__).parents[2] / "etc"
@@ -35,6 +43,44 @@ def link_inputs() -> list[bytes]:
             link.confirm(burst, Outcome.SENT, now)
             sent.append(b"".join(burst.pdus))
     return sent[:24]
+
+
+def door_inputs() -> dict[str, list[bytes]]:
+    """Those of the programs around the daemon, and of its disk."""
+    chance = Random(5)
+    twist = b'{"linear": {"x": 1.5, "y": 0}, "angular": {"z": -1e-3}}'
+    claim, fate = Claim(2, 7, 0.5), Fate(2, "cmd_vel", "ann", 7, "taken")
+    attachments = (
+        encode(Command("ann", 7, "geometry_msgs/msg/Twist", "urgent", 300.0)),
+        encode(Passed(3, "nav_msgs/msg/Odometry", b=5, e=7, pn=9, age=100)), b"",
+    )  # fmt: skip
+    keys = b"sdrlink/fleet/robot_2/cmd_vel", b"sdrlink/fleet/@gw/3/robot_2", b"sdrlink/@route/x"
+    token = Node(0, "f" * 32, "nav").endpoint(
+        5, Role.PUBLISHER, "/robot_2/cmd_vel", "geometry_msgs::msg::dds_::Twist_",
+        "RIHS01_" + "ab" * 32, Qos(),
+    )  # fmt: skip
+    keys_file = KeyFile(key=[StoredKey(kid=0, secret=KEY.secret, created="2026-11-25")])
+    packet = Packet(Kind.REQUEST, 7, 9, "/set", body=b"\0\1\0\0abcd").build()
+    return {
+        "foxglove": [
+            bytes((n,)) + b"/robot_2/cmd_vel\xff" + body
+            for n, body in enumerate((twist, to_cdr(made(DOOR_TYPES[1], chance), DOOR_TYPES[1])))
+        ],
+        "zenoh": [
+            b"\xff".join((key, attachment, encode(claim if n % 2 else fate)))
+            for n, (key, attachment) in enumerate(zip(keys, attachments, strict=True))
+        ],
+        "rmw_zenoh": [
+            b"\xff".join((token.encode(), Attachment(3, 5, bytes(16)).build(), packet)),
+            b"0/robot_2/cmd_vel/geometry_msgs::msg::dds_::Twist_/RIHS01_ab\xff\xff" + packet,
+        ],
+        "state": [a_state(), a_state(0), key_file_text(keys_file).encode()],
+        "cdr": [
+            bytes((n,)) + to_cdr(made(kind, chance), kind)
+            for n, kind in enumerate(DOOR_TYPES)
+            if knows(kind)
+        ],
+    }
 
 
 def inputs() -> dict[str, list[bytes]]:
@@ -69,6 +115,7 @@ def inputs() -> dict[str, list[bytes]]:
         "pmt": [pmt.dumps(value) for value in values] + [to_gnu_radio(ours[0][:PDU_SIZE])],
         "sigmf": [json.dumps(meta).encode(), b'{"global": {}}'],
         "hub": list(air),
+        **door_inputs(),
     }  # fmt: skip
 
 

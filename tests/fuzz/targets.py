@@ -1,6 +1,8 @@
 """What is fuzzed: for each name, a function that takes any bytes and raises nothing."""
 
+import resource
 import tempfile
+import time
 from collections.abc import Callable
 from itertools import cycle
 from pathlib import Path
@@ -29,6 +31,7 @@ from sdrlinkd.wire import (
     postponed,
     read_control_entries,
 )
+from tests.fuzz import doors
 from tests.link.world import make_link, next_burst
 
 PDU_SIZE = 64
@@ -36,6 +39,8 @@ KEY = Key(1, bytes(range(32)))
 NEW = Remembered({KEY.fingerprint: 0})
 """What is on disk of a key that was never used."""
 STEP_S = 0.01
+MOST_CPU_S, MOST_KIB = 2.0, 1 << 16
+"""Most CPU time in s, and most memory in KiB, that an input may take."""
 FORGET_AFTER = 400
 """A link starts anew after so many inputs, so that a crash can be repeated."""
 
@@ -170,7 +175,23 @@ def hub(data: bytes) -> None:
             continue
 
 
-TARGETS: dict[str, Callable[[bytes], None]] = {
+class Bounded:
+    """A target of which no input may take long, or much memory."""
+
+    def __init__(self, target: Callable[[bytes], None]) -> None:
+        self._target = target
+
+    def __call__(self, data: bytes) -> None:
+        """Give it an input."""
+        cpu_s, kib = time.thread_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        self._target(data)
+        cpu_s = time.thread_time() - cpu_s
+        kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - kib
+        assert cpu_s < MOST_CPU_S, f"{cpu_s:.1f} s for {len(data)} octets"
+        assert kib < MOST_KIB, f"{kib} KiB for {len(data)} octets"
+
+
+_TARGETS: dict[str, Callable[[bytes], None]] = {
     "pdu": pdu,
     "records": records,
     "link": Hearing(),
@@ -180,5 +201,11 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     "pmt": gnu_radio,
     "sigmf": sigmf,
     "hub": hub,
+    "foxglove": doors.foxglove,
+    "zenoh": doors.Zenoh(),
+    "rmw_zenoh": doors.rmw_zenoh,
+    "state": doors.state,
+    "cdr": doors.cdr,
 }
+TARGETS = {name: Bounded(target) for name, target in _TARGETS.items()}
 """Targets by name."""

@@ -17,8 +17,8 @@ Fits = Callable[[bytes], bool]
 
 MOST_PARTS = 1 << 18
 """Texts and other parts of variable size in one message; more take too long to look at."""
-MOST_PADDING = 7
-"""Octets behind a message that some serializers leave."""
+MOST_PADDING = 3
+"""Octets behind a message, up to the next multiple of four."""
 _SIZES = {
     "octet": 1, "byte": 1, "char": 1, "uint8": 1, "int8": 1, "uint16": 2, "int16": 2, "wchar": 2,
     "uint32": 4, "int32": 4, "float": 4, "uint64": 8, "int64": 8, "double": 8, "long double": 16,
