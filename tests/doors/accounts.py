@@ -2,6 +2,9 @@
 
 import os
 import socket
+from collections.abc import Callable
+
+from sdrlinkd.client import MessageRefusedError, NoDaemonError, RefusedError
 
 NOBODY = 65534
 OTHER_ACCOUNTS = (NOBODY,) if os.geteuid() == 0 else ()
@@ -26,5 +29,27 @@ def status_for(account, port, path="/"):
             client.sendall(request.encode())
             status = int(client.recv(4096).split()[1])
         os._exit(status - 300 if status >= 300 else 0)
+    finally:
+        os._exit(255)
+
+
+def done_by(account: int, groups: list[int], work: Callable[[], object]) -> bool:
+    """Whether a program of `account`, which is in `groups` alone, can do `work`.
+
+    It cannot if that raises what clients raise where a door is closed.
+    """
+    child = os.fork()
+    if child:
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        assert code in (0, 1), code
+        return code == 0
+    try:
+        os.setgroups(groups)
+        os.setgid(groups[0] if groups else account)
+        os.setuid(account)
+        work()
+        os._exit(0)
+    except (NoDaemonError, RefusedError, MessageRefusedError, OSError):
+        os._exit(1)
     finally:
         os._exit(255)

@@ -12,16 +12,22 @@ from benchmarks.fleet.field import free_endpoint
 from benchmarks.fleet.pdu_air import PduAir
 from benchmarks.peers.zenoh_node import configured
 from benchmarks.peers.zenoh_router import router_config
+from sdrlinkd.adapters import type_hash
 from sdrlinkd.client import Subscriber
 from sdrlinkd.config import FleetParams
 from sdrlinkd.fleet import FleetClient
+from sdrlinkd.fleet.testing import Attachment, dds_type
 from sdrlinkd.keyring import new_authority, zenoh_file
 from sdrlinkd.process import Process, module
 from tests.conftest import daemons
 from tests.waiting import wait_for
 
 ROBOT, BASE = 2, 7
-MINE, FORGED = b"\0\1\0\0mine", b"\0\1\0\0forged"
+MINE, FORGED, NODES = b"\0\1\0\0mine", b"\0\1\0\0forged", b"\0\1\0\0a node's"
+DOMAIN, TWIST = 42, "geometry_msgs/msg/Twist"
+FLEET_KEY = f"sdrlink/mine/robot_{ROBOT}/cmd_vel"
+ROS_KEY = f"{DOMAIN}/robot_{ROBOT}/cmd_vel/{dds_type(TWIST)}/{type_hash(TWIST)}"
+"""By which a node on rmw_zenoh publishes."""
 TEAM, STRANGERS = new_authority(), new_authority()
 
 
@@ -63,7 +69,7 @@ class Base:
         air = stack.enter_context(PduAir((ROBOT, BASE)))
         fleet = (
             f'[fleet]\nname = "mine"\nlisten = {json.dumps([*self.endpoints.values()])}\n'
-            f'zenoh = "{file}"\ndown = ["cmd_vel"]\n'
+            f'zenoh = "{file}"\ndown = ["cmd_vel"]\nros_domain = {DOMAIN}\n'
         )
         self.robot, base = (
             start_daemon(
@@ -97,17 +103,43 @@ def base(tmp_path_factory):
         yield Base(tmp_path_factory.mktemp("door"), start, stack)
 
 
-def put_as_stranger(settings, endpoint):
-    """Command robot ROBOT with these settings of TLS."""
+def connected(settings, endpoint):
+    """A session with these settings of TLS. Raises ZError if the gateway ends it."""
     config = configured(mode="client", connect=[endpoint])
     ours = "root_ca_certificate_base64"
     settings = {ours: tls_in(MEMBERS)[ours], "verify_name_on_connect": False, **settings}
     config.insert_json5("transport/link/tls", json.dumps(settings))
     config.insert_json5("connect/timeout_ms", "1000")
-    with contextlib.suppress(zenoh.ZError), zenoh.open(config) as session:
+    return zenoh.open(config)
+
+
+def put_to_both(session, command):
+    """Command robot ROBOT as an operator's program does, and as a node on rmw_zenoh."""
+    session.put(FLEET_KEY, command)
+    put_as_node(session, command)
+
+
+def put_as_node(session, command):
+    now_ns = time.time_ns()
+    session.put(ROS_KEY, command, attachment=Attachment(now_ns >> 10, now_ns, bytes(16)).build())
+
+
+def put_as_stranger(settings, endpoint):
+    """Command robot ROBOT with these settings of TLS."""
+    with contextlib.suppress(zenoh.ZError), connected(settings, endpoint) as session:
         for _ in range(10):
-            session.put(f"sdrlink/mine/robot_{ROBOT}/cmd_vel", FORGED)
+            put_to_both(session, FORGED)
             time.sleep(0.05)
+
+
+def commanded_by_node(endpoint, base):
+    """Whether a command of a node that has a certificate of the team comes to the robot."""
+    with connected(tls_in(MEMBERS), endpoint) as session:
+        for _ in range(50):
+            put_as_node(session, NODES)
+            if base.hears(NODES, 0.2):
+                return True
+    return False
 
 
 async def commanded_by(params, folder, base):
@@ -128,6 +160,7 @@ def test_who_has_no_right_commands_no_robot_and_who_has_it_does(protocol, who, b
     (tmp_path / "team.json5").write_text(MEMBERS)
     params = FleetParams(name="mine", connect=[endpoint], zenoh="team.json5")
     assert asyncio.run(commanded_by(params, tmp_path, base))
+    assert commanded_by_node(endpoint, base)
     put_as_stranger(STRANGERS_CLIENTS[who], endpoint)
     assert not base.hears(FORGED, 1.0)
     assert asyncio.run(commanded_by(params, tmp_path, base))

@@ -1,16 +1,22 @@
 """Rows without daemons: parsers, ledgers, sequence numbers, keys."""
 
+import subprocess
+import sys
 import time
 from collections import Counter
+from pathlib import Path
 from random import Random
+from xml.etree import ElementTree
 
 import pytest
 
 from sdrlinkd.config import parse_config
 from sdrlinkd.errors import ConfigError
+from sdrlinkd.fleet import Election
 from sdrlinkd.link import Outcome, Overrides
 from sdrlinkd.link.receive import SequenceTrack
 from sdrlinkd.wire import Entry, Pdu, build
+from tests.fleet.test_election import LEASE_S, SCORES, TICK_S, faulty, heals
 from tests.fuzz.corpus import CORPUS
 from tests.fuzz.mutate import mutate
 from tests.fuzz.targets import TARGETS
@@ -21,6 +27,7 @@ from tests.sealing.machine import Machine
 from tests.sealing.team import KEY, NEXT
 
 pytestmark = pytest.mark.long
+ROOT = Path(__file__).parents[2]
 
 OUTCOMES = (Outcome.SENT,) * 4 + (Outcome.LATE, Outcome.LOST)
 EVENTS = ("send", "send", "send", "time", "late", "disk", "restart", "anew")
@@ -153,6 +160,19 @@ def test_row_15_numbers_over_restarts(lasting, figure):
     figure(15, "restarts with power cuts and full disks", f"{restarts}, {numbers} numbers, 0 twice")
 
 
+def test_row_21_doors(tmp_path, figure):
+    """All of `tests/doors`: each is closed to strangers, and open to its people."""
+    told = tmp_path / "doors.xml"
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--junitxml={told}"]
+    done = subprocess.run(
+        [*command, "tests/doors"], cwd=ROOT, check=False, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout[-2000:]
+    suite = ElementTree.parse(told).getroot()[0]
+    assert suite.get("skipped") == "0"
+    figure(21, "strangers at every door", f"{suite.get('tests')} attempts, none came in")
+
+
 def test_row_22_robots_that_lost_their_disks(lasting, figure):
     """A life lasts for half a day at most; one in three ends with another disk."""
     chance, lives, lost, refused, numbers = Random(22), 0, 0, 0, 0
@@ -176,6 +196,24 @@ def test_row_22_robots_that_lost_their_disks(lasting, figure):
         22, "robots that lost their disks",
         f"{lost} of {lives} lives, {refused} of them without clock and company sent nothing, "
         f"{numbers} numbers, 0 twice",
+    )  # fmt: skip
+
+
+def test_row_23_election(lasting, figure):
+    """Three gateways; claims are lost and forged without end, and then no more."""
+    chance, walks, faults = Random(23), 0, 0
+    for _ in lasting():
+        elections = {gw: Election(gw, LEASE_S, 0.0) for gw in SCORES}
+        now = 0.0
+        for _ in range(chance.randrange(1, 40)):
+            order = chance.sample(sorted(SCORES), len(SCORES))
+            more, elections = chance.choice(list(faulty(elections, now, order)))
+            now, faults = now + TICK_S, faults + more
+        assert heals(elections, now)
+        walks += 1
+    figure(
+        23, "claims of gateways lost and forged",
+        f"{walks} walks, {faults} faults; each time one leader within a lease",
     )  # fmt: skip
 
 

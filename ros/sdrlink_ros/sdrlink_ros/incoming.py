@@ -279,6 +279,7 @@ class Incoming:
         elif not outlet.kind.fits(cdr):
             self.dropped["rx_bad_cdr"] += 1
         else:
+            outlet.is_sealed = message.is_sealed
             if outlet.is_known(message):
                 return
             if outlet.is_restamped and message.published_ns is not None:

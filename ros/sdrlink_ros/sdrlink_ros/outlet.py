@@ -52,6 +52,8 @@ class Outlet:
         self.gone_at: float | None = None
         """Since when it is not declared any more."""
         self.is_closed = False
+        self.is_sealed: bool | None = None
+        """Whether the last message came sealed; None: none has come."""
         self.newest = (0, 0)
         """Number and time of reception of the newest message."""
 

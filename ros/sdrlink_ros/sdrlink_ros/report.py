@@ -43,7 +43,7 @@ def topics(
             "topic": outlet.names[0], "type": outlet.kind.name, "direction": "in",
             "robot": outlet.source.robot,
             "state": "wanted" if bus in incoming.wanted else "no subscriber here",
-            "published": incoming.published[bus],
+            "published": incoming.published[bus], "sealed": outlet.is_sealed,
         }
         for bus, outlet in incoming.outlets.items()
     ]  # fmt: skip
