@@ -2,13 +2,16 @@
 
 import json
 import signal
+import struct
 import subprocess
 import sys
+import threading
 import time
 from itertools import islice
 from random import Random
 
 import pytest
+import zmq
 from msgspec import to_builtins
 
 from benchmarks.fleet.pdu_air import PduAir
@@ -28,6 +31,8 @@ from tests.waiting import wait_for
 pytestmark = pytest.mark.long
 HEALTHY, HIT = 251, 252
 ODOM = CDR + bytes(40)
+NO_FIELDS = b"\x01\x80"
+"""An envelope of version 1 that says nothing, not even a time."""
 
 FLOOD = """
     from sdrlinkd.client import Publisher
@@ -273,6 +278,59 @@ def test_row_20_a_flood_of_declared_topics(start_daemon, lasting, figure):
         assert problems(hit) == []
         assert max(waits) < 5
         assert len(ages) > 10
+
+
+def test_row_24_stops_that_stutter(start_daemon, lasting, figure):
+    """The daemon is stopped again as soon as it has awoken: what waited meanwhile is old.
+
+    Its producer tells no times.
+    """
+    daemon = start_daemon("[topic.odom]\nlifespan_s = 1.0\ndepth = 0\n")
+    rng, sent, late, stops, is_over = Random(24), 0, 0, 0, threading.Event()
+    context = zmq.Context()
+
+    def produce():
+        nonlocal sent
+        out = context.socket(zmq.PUSH)
+        out.connect(f"ipc://{daemon.directory / 'in.sock'}")
+        while not is_over.wait(0.003):
+            stamp = struct.pack("<d", time.monotonic())
+            out.send_multipart([b"/robot_1/odom\0", NO_FIELDS, CDR + stamp])
+            sent += 1
+        out.close(linger=0)
+
+    ages = []
+
+    def listen():
+        with Subscriber("/rx_robot_1/odom", directory=daemon.directory, depth=0) as heard:
+            while not is_over.is_set():
+                message = heard.receive(0.1)
+                if message is not None:
+                    stamp = struct.unpack_from("<d", message.payload, 4)[0]
+                    ages.append(time.monotonic() - stamp)
+
+    threads = [threading.Thread(target=each) for each in (produce, listen)]
+    for each in threads:
+        each.start()
+    wait_for(lambda: len(ages) > 10)
+    for _ in lasting():
+        for stopped_s, awake_s in ((3.0, rng.uniform(0.002, 0.012)), (0.6, 1.5)):
+            daemon.send_signal(signal.SIGSTOP)
+            time.sleep(stopped_s)
+            daemon.send_signal(signal.SIGCONT)
+            time.sleep(awake_s)
+            stops += 1
+    is_over.set()
+    for each in threads:
+        each.join()
+    context.term()
+    late = sum(age > 2.0 for age in ages)
+    assert problems(daemon) == []
+    assert late == 0
+    figure(
+        24, "stops that stutter, a producer without times",
+        f"{stops} stops; {len(ages)} of {sent} messages heard, the oldest {max(ages):.1f} s old",
+    )  # fmt: skip
 
 
 def about(number):
