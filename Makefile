@@ -85,6 +85,10 @@ wheel: $(DEV_STAMP)
 	for each in x86-64-v3 x86-64 aarch64; do $(BIN)/sdrlinkctl phy compile --for $$each || exit 1; done
 	$(BIN)/python -m hatchling build -t wheel
 	cd etc/client && ../../$(BIN)/python -m hatchling build -t wheel -d ../../dist
+	rm -rf build/of-wheel && $(BIN)/python -m venv build/of-wheel
+	build/of-wheel/bin/python -m pip --quiet --disable-pip-version-check install -c constraints.txt \
+		"$$(echo dist/sdrlinkd-*.whl)[plots,metrics,zenoh,web,foxglove]"
+	sh etc/sbom.sh build/of-wheel/bin/python dist/sdrlinkd.cdx.json
 
 deb:
 	sh etc/deb/build.sh

@@ -80,6 +80,7 @@ system() {
     doc=$root/usr/share/doc/sdrlinkd
     install -D -m 644 etc/deb/copyright "$doc/copyright"
     install -m 644 CHANGELOG.md "$doc/"
+    SBOM_PYTHON=$python sh etc/sbom.sh "$env/bin/python3" "$doc/sbom.cdx.json"
     printf 'sdrlinkd (%s) stable; urgency=medium\n\n  * See CHANGELOG.md.gz.\n\n -- %s  %s\n' "$version" \
         "$(sed -n 's/^Maintainer: //p' etc/deb/control)" "$(date -uRd "@$SOURCE_DATE_EPOCH")" > "$doc/changelog"
     install -D -m 644 etc/deb/lintian-overrides "$root/usr/share/lintian/overrides/sdrlinkd"

@@ -88,6 +88,23 @@ def test_units_find_their_programs_and_wait_for_a_person(installed):
     assert not list((installed.path / "etc/systemd/system").rglob("sdrlink*"))
 
 
+def test_a_bill_of_materials_names_all_that_it_brings(installed):
+    told = json.loads(installed.run("cat /usr/share/doc/sdrlinkd/sbom.cdx.json"))
+    assert told["bomFormat"] == "CycloneDX"
+    listed = {
+        each["name"].lower().replace("_", "-").replace(".", "-"): each["version"]
+        for each in told["components"]
+    }
+    brought = installed.run(
+        "/opt/sdrlinkd/bin/python3 -c 'from importlib.metadata import distributions as all_;"
+        'print(*(f"{each.name}={each.version}" for each in all_()))\''
+    )
+    for each in brought.split():
+        name, _, version = each.partition("=")
+        assert listed[name.lower().replace("_", "-").replace(".", "-")] == version, name
+    assert "numpy" in listed
+
+
 def test_nobody_but_root_can_change_what_was_installed(installed):
     for kind in ("! -user root", "! -type l -perm /022"):
         assert installed.run(f"find /opt/sdrlinkd /etc/sdrlinkd {kind}") == ""
