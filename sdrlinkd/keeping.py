@@ -53,7 +53,8 @@ class Keeping:
 
     def look(self, now: float, *, at_once: bool) -> None:
         """Write what is due at `now`: in a thread, or `at_once`, where time waits for us."""
-        if not at_once and now >= self._aged_at + AGES_S:
+        # The link's clock may begin anew.
+        if not at_once and not 0 <= now - self._aged_at < AGES_S:
             self._aged_at = now
             self._tell_ages(now)
         if self._writing is not None and not self._writing.done():

@@ -77,7 +77,8 @@ class Opener:
         self._peers = peers
         self._contacts = contacts
         self._strangers = strangers
-        self._recalling = recalling
+        self.recalling = recalling
+        """Who answers others about their numbers."""
         self.resuming: Resuming | None = None
         """Who takes answers about our numbers; None: they are known."""
         self._known_before = known_before
@@ -165,7 +166,7 @@ class Opener:
                 self._strangers.tells(src, record, now)
             elif src != self._own_id:
                 self._strangers.lost(src, now)
-                self._recalling.asked(src, record)
+                self.recalling.asked(src, record)
             return True
         is_known = src in self._known_before or self._peers.was_opened(src)
         if self._params.clear == "accept" and not is_known:

@@ -149,6 +149,9 @@ class Sealing:
         """Go on with another clock."""
         self._numbers.begin_anew()
         self._peers.restart()
+        self._ages.tell({}, 0.0)
+        self._recalling = self.opener.recalling = Recalling(self._draw)
+        self.opener.resuming, self._lost_words = None, ""
 
     def contact(self, now: float, room: int) -> tuple[Contact, float]:
         """(our CONTACT at `now`, of at most `room` octets, when it gets a PDU of its own)."""

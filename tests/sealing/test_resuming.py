@@ -272,3 +272,19 @@ def test_a_daemon_that_restarts_without_end_says_what_it_costs():
     machine.resume()
     (notice,) = machine.sealing.notices(machine.now)
     assert notice.startswith("the daemon was restarted so often that its numbers of key 0")
+
+
+def test_with_another_clock_all_is_asked_anew():
+    """What was known by the old one, such as the age of the key, is not known by this one."""
+    machine, _ = asking()
+    sealing = machine.sealing
+    sealing.tell_ages({KEY.fingerprint: 5000.0}, 15.0)
+    sealing.look(15.0)
+    sealing.begin_anew()
+    sealing.look(0.0)
+    assert isinstance(sealing.told_in_clear(0.0), LostNumbers)
+    sealing.look(LISTEN_S + 1)
+    assert sealing.is_lost, "its age by the new clock is not known"
+    sealing.tell_ages({KEY.fingerprint: 6000.0}, LISTEN_S + 2)
+    sealing.look(LISTEN_S + 2)
+    assert not sealing.is_lost
