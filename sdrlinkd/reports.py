@@ -376,6 +376,10 @@ class SecurityReport(msgspec.Struct, frozen=True, kw_only=True):
     """How often a burst waited for numbers of sealed PDUs."""
     halted: str = ""
     """Why nothing is sent any more, as a sentence; empty: all is well."""
+    strangers: list[str] = []
+    """Sentences on robots that are heard and not believed, as they have another key, for example.
+
+    Anybody can send what leads to them."""
     copies: list[int] = []
     """Robots on other machines with the machine id of this one: one disk is a copy of the other."""
 

@@ -52,7 +52,7 @@ def rotate(
     from sdrlinkd.wire import N_KIDS
 
     held = _held(Path(_setup(config).config.security.keys))
-    _create(file, new_key((held.key[-1].kid + 1) % N_KIDS))
+    _create(file, new_key((held.key[-1].kid + 1) % N_KIDS, follows=True))
     _say(
         "each robot changes to it once all robots that it hears have it, or after 10 minutes; the "
         "old key opens for 10 more minutes at most"
@@ -93,9 +93,11 @@ def install(
     installed = _held(path) if copy and path.exists() else None
     keys = given if replace or installed is None else _merged(installed, given, state, path)
     check_number(keys, str(path))
+    keys = structs.replace(keys, key=[_with_robots(key, installed) for key in keys.key])
     if new:
         _check_new(keys, state, setup.node_id)
-    is_new = new or state.is_whole
+    # A credential does not tell on which robots a key was used.
+    is_new = new or (copy and state.is_whole)
     begun = [_begun(key, state, setup.node_id, owner, is_new) for key in keys.key]
     if copy:
         write_key_file(path, structs.replace(keys, key=begun), owner)
@@ -162,7 +164,7 @@ def check(
 ) -> None:
     """Check whether another robot has the running daemon's key; exit code 1 if it has not."""
     from sdrlinkd.asking import ask_status
-    from sdrlinkd.keyring import words_of
+    from sdrlinkd.sealing import words_of
 
     with connect(runtime_dir) as control:
         snapshot = ask_status(control)
@@ -252,6 +254,13 @@ def _merged(installed: "KeyFile", given: "KeyFile", state: "KeyState", path: Pat
     )
 
 
+def _with_robots(key: "StoredKey", installed: "KeyFile | None") -> "StoredKey":
+    """A key with the robots on which it was used, as far as the installed file tells, too."""
+    before = installed.key if installed is not None else ()
+    robots = [each.robots for each in before if each.fingerprint == key.fingerprint]
+    return structs.replace(key, robots=sorted({*key.robots, *(robots[0] if robots else ())}))
+
+
 def _check_new(keys: "KeyFile", state: "KeyState", robot: int) -> None:
     """Check that a key file does not tell that the robot used a key. Raises UserError."""
     for key in keys.key:
@@ -271,7 +280,7 @@ def _begun(
     is_new: bool,
 ) -> "StoredKey":
     """The key, whose numbers begin on this robot if it is new here."""
-    if is_new and robot not in key.robots and not state.knows(key.key):
+    if is_new and robot not in key.robots and not state.has_file(key.key):
         state.begin(key.key, owner)
     return structs.replace(key, robots=sorted({*key.robots, robot}))
 
@@ -320,7 +329,7 @@ def _reloaded(setup: "Setup") -> str:
 
 
 def _told(key: "StoredKey") -> str:
-    from sdrlinkd.keyring import words_of
+    from sdrlinkd.sealing import words_of
 
     made = f", made {key.made_on}" if key.created else ""
     return f"key {key.kid}{made}: {words_of(key.fingerprint)}"

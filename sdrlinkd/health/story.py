@@ -9,6 +9,9 @@ from sdrlinkd.health.verdict import is_away, is_silent
 from sdrlinkd.health.words import pdu_link_name, span
 from sdrlinkd.reports import NeighborReport, Snapshot, TopicReport
 
+BEGINNING = 20
+"""Characters of a sentence by which those on one robot are known."""
+
 
 class Level(IntEnum):
     """Urgency of a line, as the logging module numbers it."""
@@ -42,6 +45,7 @@ class Story:
         self._losing_at: float | None = None
         self._steps = 0
         self._replaced: set[str] = set()
+        self._unbelieved: set[str] = set()
 
     def tell(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
         """Log lines on what is new in a snapshot."""
@@ -49,12 +53,20 @@ class Story:
         for robot in snapshot.link.neighbors:
             if not robot.is_self:
                 yield from self._robot(robot, snapshot)
+        yield from self._strangers(snapshot.link.security.strangers)
         yield from self._queue(snapshot, lately)
         yield from self._samples(snapshot, lately)
         yield from self._replacing(snapshot.link.topics)
         if snapshot.host_clock_steps > self._steps:
             yield Line("host clock", Level.WARNING, "this host's clock was stepped")
         self._steps = snapshot.host_clock_steps
+
+    def _strangers(self, sentences: Sequence[str]) -> Iterator[Line]:
+        """A line for each robot that is heard and not believed, as it becomes so."""
+        for sentence in sentences:
+            if sentence not in self._unbelieved:
+                yield Line(sentence[:BEGINNING], Level.WARNING, sentence)
+        self._unbelieved = set(sentences)
 
     def _replacing(self, topics: Sequence[TopicReport]) -> Iterator[Line]:
         """A line for each topic on its first messages that newer ones replaced."""

@@ -12,6 +12,8 @@ GONE_S = 600.0
 LOSSY = 0.03
 """Share of lost PDUs from which a loss is reported."""
 AWAY_S = 1.0
+OLD_S, OLD_PERIODS = 1.0, 10.0
+"""Age in s, and in periods of its topic, above which a message is reported as old."""
 CLIPPED_PCT = 0.1
 LATE_LOOP_MS = 250.0
 
@@ -32,11 +34,14 @@ def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport
     down = _down(snapshot)
     if down:
         return VerdictReport(level="DOWN", reasons=[down])
+    # Causes come before what they explain.
     reasons = [
-        *_robots(snapshot, shares_air),
+        *_machine(snapshot, lately),
+        *snapshot.link.security.strangers,
+        *_robots(snapshot, shares_air, is_starved=lately.grown(snapshot, "samples_lost") > 0),
         *_air(snapshot, lately),
         *_queue(snapshot, lately),
-        *_machine(snapshot, lately),
+        *_ages(snapshot),
     ]
     if snapshot.state == "draining":
         reasons.insert(0, "stopping: sends what is queued, accepts nothing more")
@@ -58,11 +63,15 @@ def _down(snapshot: Snapshot) -> str:
         return f"no {name} since {since}" + (f": {pdu_link.reason}" if pdu_link.reason else "")
     if pdu_link.state == "ended":
         return f"the {name} has ended"
-    return ""
+    others = any(not each.is_self for each in snapshot.link.neighbors)
+    return "" if others else "; ".join(snapshot.link.security.strangers)
 
 
-def _robots(snapshot: Snapshot, shares_air: bool) -> list[str]:
-    """Reasons that concern the robots that we hear, and how they hear us."""
+def _robots(snapshot: Snapshot, shares_air: bool, *, is_starved: bool) -> list[str]:
+    """Reasons that concern the robots that we hear, and how they hear us.
+
+    `is_starved`: samples were dropped, which explains why we hear less.
+    """
     robots = [each for each in snapshot.link.neighbors if not each.is_self]
     reasons = []
     if not robots and shares_air:
@@ -72,14 +81,14 @@ def _robots(snapshot: Snapshot, shares_air: bool) -> list[str]:
             if robot.last_heard_s_ago < GONE_S:
                 reasons.append(f"robot {robot.src} not heard for {span(robot.last_heard_s_ago)}")
             continue
-        reasons += _quality(robot)
+        reasons += _quality(robot, is_starved=is_starved)
     if robots and all(each.last_heard_s_ago >= GONE_S for each in robots):
         last_s = min(each.last_heard_s_ago for each in robots)
         reasons.append(f"no robot heard for {span(last_s)}")
     return reasons
 
 
-def _quality(robot: NeighborReport) -> list[str]:
+def _quality(robot: NeighborReport, *, is_starved: bool) -> list[str]:
     reasons = []
     if robot.registry == "differs":
         reasons.append(f"robot {robot.src} has a different topic registry")
@@ -87,7 +96,7 @@ def _quality(robot: NeighborReport) -> list[str]:
         reasons.append(
             f"robot {robot.src} hears us{_at(robot.snr_there_db)}, {percent(robot.per_there)} lost"
         )
-    if robot.per_lately is not None and robot.per_lately >= LOSSY:
+    if robot.per_lately is not None and robot.per_lately >= LOSSY and not is_starved:
         reasons.append(
             f"we hear robot {robot.src}{_at(robot.snr_db)}, {percent(robot.per_lately)} lost"
         )
@@ -132,11 +141,37 @@ def _queue(snapshot: Snapshot, lately: Lately) -> list[str]:
     return [f"traffic exceeds the channel capacity: {dropped}, most of {worst}{others}"]
 
 
+def _ages(snapshot: Snapshot) -> list[str]:
+    """Reasons that concern topics which wait, here or at their source, the oldest first."""
+    waiting = [
+        (topic.queue_ms, f"{topic.name} waits {_seconds(topic.queue_ms)} in the queue")
+        for topic in snapshot.link.topics
+        if topic.queued
+        and topic.queue_ms is not None
+        and _is_old(topic.queue_ms, topic.accepted_per_s)
+    ]
+    old = [
+        (topic.age_ms_p50, f"{topic.republished_as} is {_seconds(topic.age_ms_p50)} old")
+        for topic in snapshot.link.received
+        if topic.age_ms_p50 is not None and _is_old(topic.age_ms_p50, topic.delivered_per_s)
+    ]
+    return [words for _, words in sorted(waiting + old, reverse=True)]
+
+
+def _is_old(age_ms: float, per_s: float) -> bool:
+    """Whether messages that come so often are older than they should be."""
+    return per_s > 0 and age_ms > 1e3 * max(OLD_S, OLD_PERIODS / per_s)
+
+
+def _seconds(ms: float) -> str:
+    return f"{ms / 1e3:.1f} s" if ms < 1e4 else span(ms / 1e3)
+
+
 def _machine(snapshot: Snapshot, lately: Lately) -> list[str]:
     pdu_link, reasons = snapshot.carrier, []
     lost = lately.grown(snapshot, "samples_lost")
     if lost > 0:
-        reasons.append(f"{lost} samples dropped in {RATE_WINDOW_S:g} s: the CPU is too slow")
+        reasons.append(f"the CPU is too slow: {lost} samples dropped in {RATE_WINDOW_S:g} s")
     if pdu_link.clipped_pct >= CLIPPED_PCT:
         reasons.append(
             f"the receiver clips {pdu_link.clipped_pct:.2g} % of the samples: lower its gain"

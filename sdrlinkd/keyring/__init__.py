@@ -19,7 +19,6 @@ from sdrlinkd.keyring.files import (
 )
 from sdrlinkd.keyring.making import new_key
 from sdrlinkd.keyring.state import KeyState, machine_tag, state_dir
-from sdrlinkd.keyring.words import words_of
 
 __all__ = [
     "CREDENTIAL",
@@ -37,7 +36,6 @@ __all__ = [
     "parse_key_file",
     "read_key_file",
     "state_dir",
-    "words_of",
     "write_key_file",
     "zenoh_file",
 ]

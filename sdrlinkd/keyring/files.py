@@ -38,11 +38,13 @@ class StoredKey(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """When it was made: a time in UTC, or a day alone if the clock was not synchronized."""
     robots: list[RobotId] = []
     """Robots whose numbers were begun with this file."""
+    follows: bool = False
+    """Whether it was made as the next key of another one."""
 
     @property
     def key(self) -> Key:
         """The key without what people know about it."""
-        return Key(self.kid, self.secret, made_s=self.made_s)
+        return Key(self.kid, self.secret, made_s=self.made_s, follows=self.follows)
 
     @property
     def made_s(self) -> float | None:
@@ -92,6 +94,7 @@ def load_keys(path: Path) -> list[Key]:
             each.secret,
             {frozenset(pair.robots): pair.secret for pair in read.pair if pair.kid == each.kid},
             each.made_s,
+            each.follows,
         )
         for each in read.key
     ]

@@ -8,8 +8,8 @@ from sdrlinkd.keyring.files import KeyFile, StoredKey
 from sdrlinkd.sealing import KEY_SIZE
 
 
-def new_key(kid: int) -> KeyFile:
-    """A file with a new random key, made now.
+def new_key(kid: int, *, follows: bool = False) -> KeyFile:
+    """A file with a new random key, made now; `follows`: as the next one of another key.
 
     It says when, if this computer's clock is synchronized. By that, a robot that has lost its state
     knows which numbers of the key it cannot have used.
@@ -17,4 +17,4 @@ def new_key(kid: int) -> KeyFile:
     now = datetime.datetime.now(datetime.UTC)
     made = f"{now:%Y-%m-%dT%H:%M:%SZ}" if is_synchronized() else f"{now:%Y-%m-%d}"
     secret = secrets.token_bytes(KEY_SIZE)
-    return KeyFile(key=[StoredKey(kid=kid, secret=secret, created=made)])
+    return KeyFile(key=[StoredKey(kid=kid, secret=secret, created=made, follows=follows)])

@@ -94,7 +94,7 @@ class KeyState:
 
         A file that is damaged counts as none. Raises UserError if one cannot be read.
         """
-        floors, newest, in_use, retired = {}, {}, b"", set()
+        floors, newest, in_use, retired, resumed = {}, {}, b"", set(), set()
         machine = machine_hash()
         for key in keys:
             state = self._read(key.fingerprint)
@@ -107,12 +107,16 @@ class KeyState:
             floors[key.fingerprint] = floor
             if state.is_whole:
                 self._whole.add(key.fingerprint)
+            else:
+                resumed.add(key.fingerprint)
             newest[key.fingerprint] = state.newest
             if state.in_use:
                 in_use = key.fingerprint
             if state.retired:
                 retired.add(key.fingerprint)
-        return Remembered(floors, newest, in_use, frozenset(retired), self._known())
+        return Remembered(
+            floors, newest, in_use, frozenset(retired), self._known(), frozenset(resumed)
+        )
 
     def save(self, remembered: Remembered) -> None:
         """Write what must be remembered; it is on disk on return. Raises OSError."""
@@ -135,9 +139,14 @@ class KeyState:
         """Whether the numbers of a key are here. Raises UserError."""
         return self._read(key.fingerprint) is not None
 
+    def has_file(self, key: Key) -> bool:
+        """Whether there is a file of a key, damaged or not."""
+        return self._path(key.fingerprint.hex()).exists()
+
     def begin(self, key: Key, owner: tuple[int, int] | None) -> None:
         """Begin the numbers of a key that was never used on this robot. Raises UserError."""
         state = _OfKey(fingerprint=key.fingerprint.hex(), machine=machine_hash(), floor=0)
+        self._whole.add(key.fingerprint)
         try:
             self._write(state, owner)
         except OSError as error:
@@ -145,9 +154,15 @@ class KeyState:
 
     @property
     def is_whole(self) -> bool:
-        """Whether this directory has been kept since a key was new. Raises UserError."""
-        paths = self.directory.glob(f"robot-{self._robot_id}-key-*.json")
-        return any(state is not None and state.is_whole for state in map(self._read_at, paths))
+        """Whether this directory has been kept, on this machine, since a key was new.
+
+        Raises UserError.
+        """
+        paths, machine = self.directory.glob(f"robot-{self._robot_id}-key-*.json"), machine_hash()
+        return any(
+            state is not None and state.is_whole and state.machine == machine
+            for state in map(self._read_at, paths)
+        )
 
     def check(self) -> None:
         """Check that the directory can be written. Raises UserError."""

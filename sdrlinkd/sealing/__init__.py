@@ -11,6 +11,7 @@ from sdrlinkd.sealing.opener import Opened
 from sdrlinkd.sealing.params import SecurityParams
 from sdrlinkd.sealing.remembered import Memory, Remembered
 from sdrlinkd.sealing.sealing import Sealing
+from sdrlinkd.sealing.words import words_of
 
 __all__ = [
     "FINGERPRINT_SIZE",
@@ -22,4 +23,5 @@ __all__ = [
     "Remembered",
     "Sealing",
     "SecurityParams",
+    "words_of",
 ]

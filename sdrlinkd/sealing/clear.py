@@ -96,6 +96,6 @@ class InTheClear:
         """A sentence on each robot that seals its PDUs."""
         return self.opener.strangers.notices(now)
 
-    def report(self, now: float) -> SecurityReport:  # noqa: ARG002  # as in Sealing
+    def report(self, now: float) -> SecurityReport:
         """The report: nothing is sealed."""
-        return SecurityReport()
+        return SecurityReport(strangers=self.opener.strangers.notices(now))

@@ -18,6 +18,8 @@ class Key:
     pairs: Mapping[frozenset[int], bytes] = field(default_factory=dict, hash=False)
     made_s: float | None = field(default=None, compare=False)
     """When it was made, in s since 1970 by a clock that was synchronized; None: not known."""
+    follows: bool = field(default=False, compare=False)
+    """Whether it is the next key of another one, whose numbers may have gone on under it."""
 
     @property
     def fingerprint(self) -> bytes:

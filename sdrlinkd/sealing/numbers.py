@@ -12,6 +12,8 @@ LEAST_RESERVE_S = 20.0
 LEAP_S = 30.0
 """Key time in s that a start skips. It is longer than a proof lasts, so that no attacker can pass a
 PDU of one life off as one of another by delaying it (see `peers`)."""
+MOST_BROUGHT = N_TICKS // 2
+"""T from which on another key begins with its own numbers."""
 REMEMBERED_TICKS = 10 * TICKS_PER_S
 
 
@@ -48,6 +50,11 @@ class Numbers:
             self._zero = at
         return self._begin / TICKS_PER_S + (at - self._zero)
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether the key time of this life runs."""
+        return self._zero is not None
+
     def offset(self, at: float) -> float:
         """The key time minus the link's clock at time `at`, in s; it changes with the key alone."""
         return self.clock(at) - at
@@ -60,13 +67,13 @@ class Numbers:
     def change_key(self, floor: int | None) -> None:
         """Seal with another key from now on, of which `floor` is on disk, as at the start.
 
-        T goes on, so that others notice nothing, as long as that leaves the key half of its life.
+        T goes on, so that others notice nothing, as long as it is below MOST_BROUGHT.
         No number is given out before `move_floor`.
         """
         was_lost, self.is_lost = self.is_lost, floor is None
         if floor is None:
             return
-        if was_lost or floor > self.newest or self.newest >= N_TICKS // 2:
+        if was_lost or floor > self.newest or self.newest >= MOST_BROUGHT:
             self._begin_at(_leap(floor) if floor else 0)
         self._then = -inf
         self.floor = self._end = self.newest

@@ -23,6 +23,8 @@ class Remembered(NamedTuple):
     """Fingerprints of the keys that do not open any more."""
     known: frozenset[int] = frozenset()
     """Robots of which a sealed PDU was opened at any time."""
+    resumed: frozenset[bytes] = frozenset()
+    """Fingerprints of the keys whose numbers were lost once."""
 
 
 class Memory:
@@ -47,14 +49,23 @@ class Memory:
         return self._present(self._numbers.floor if floor is None else floor)
 
     def written(self, remembered: Remembered) -> None:
-        """Note what is on disk now."""
-        self.on_disk, self.failed = remembered, ""
+        """Note what is on disk now; what was added while it was written stays."""
+        before, self.failed = self.on_disk, ""
+        floors = dict(before.floors)
+        for fingerprint, floor in remembered.floors.items():
+            floors[fingerprint] = max(floors.get(fingerprint, 0), floor)
+        newest = {**before.newest, **remembered.newest}
+        self.on_disk = remembered._replace(floors=floors, newest=newest)
         if remembered.in_use == self._keys.own.key.fingerprint:
             self._numbers.move_floor(remembered.floors.get(remembered.in_use, 0))
 
     def not_written(self, why: str) -> None:
         """Note that nothing could be written."""
         self.failed = f"the numbers of sealed PDUs cannot be written to disk: {why}"
+
+    def resumed(self, fingerprint: bytes) -> None:
+        """Note that the numbers of a key were lost, and go on."""
+        self.on_disk = self.on_disk._replace(resumed=self.on_disk.resumed | {fingerprint})
 
     def add(self, loaded: Remembered) -> None:
         """Note what is on disk about keys that were installed while all runs."""
@@ -63,7 +74,8 @@ class Memory:
         for fingerprint, floor in loaded.floors.items():
             floors[fingerprint] = max(floors.get(fingerprint, 0), floor)
         newest = {**loaded.newest, **on_disk.newest}
-        self.on_disk = on_disk._replace(floors=floors, newest=newest)
+        resumed = on_disk.resumed | loaded.resumed
+        self.on_disk = on_disk._replace(floors=floors, newest=newest, resumed=resumed)
 
     def at_stop(self) -> Remembered:
         """What should be written when the daemon stops: the floor as it is, and the newest T."""
@@ -84,4 +96,4 @@ class Memory:
             # A floor is never lowered.
             floors[own] = max(floor, on_disk.floors.get(own, 0))
         heard = frozenset(src for each in newest.values() for src in each)
-        return Remembered(floors, newest, own, retired, on_disk.known | heard)
+        return Remembered(floors, newest, own, retired, on_disk.known | heard, on_disk.resumed)

@@ -9,9 +9,16 @@ from collections.abc import Callable
 from math import ceil, inf
 
 from sdrlinkd.sealing.keys import Key
-from sdrlinkd.sealing.numbers import Numbers
+from sdrlinkd.sealing.numbers import MOST_BROUGHT, Numbers
 from sdrlinkd.sealing.peers import SILENT_S
-from sdrlinkd.wire import KEY_PREFIX_SIZE, N_TICKS, TICKS_PER_S, FoundNumbers, LostNumbers
+from sdrlinkd.wire import (
+    CONTACT_NUMBER_SIZE,
+    KEY_PREFIX_SIZE,
+    N_TICKS,
+    TICKS_PER_S,
+    FoundNumbers,
+    LostNumbers,
+)
 
 DAY_S = 86400.0
 LISTEN_S = SILENT_S
@@ -23,20 +30,26 @@ AHEAD_S, PACE = 4 * DAY_S, 1.25
 """A robot that knows the age of the key goes on at AHEAD_S, in s, and PACE times that age.
 
 Its key time counts the time in use, and leaps at each start. So it stays below this while the robot
-starts less than once in six minutes on average."""
+starts less than once in six minutes on average. What it brought from another key comes on top."""
 LAST_QUARTER = 3 * N_TICKS // 4
 """T above which a robot goes on that does not know the age. There, it meets no numbers of a life
 that began by the age, and that nobody heard."""
 UNHEARD_S = DAY_S
 """Key time in s that it may have used there since others heard it last."""
+PARTS = 4
+"""It begins anywhere in one of so many parts of what is left there: by chance, as it may have begun
+there before, and nobody may have heard that."""
+STILL_S = 600.0
+"""Time in s for which answers are awaited after a start by the age: it may be too low."""
 ANSWER_S = 0.5
 """Least time in s between two answers to others."""
 MOST_ANSWERS = 4
 
 
-def most_ticks(age_s: float) -> int:
+def most_ticks(key: Key, age_s: float) -> int:
     """The T that no robot has reached with a key that was made `age_s` ago."""
-    return min(ceil((AHEAD_S + PACE * max(age_s, 0.0)) * TICKS_PER_S), N_TICKS)
+    brought = MOST_BROUGHT if key.follows else 0
+    return min(brought + ceil((AHEAD_S + PACE * max(age_s, 0.0)) * TICKS_PER_S), N_TICKS)
 
 
 class Ages:
@@ -58,20 +71,23 @@ class Ages:
 class Resuming:
     """Finds the T above which `key` may be used again; `number` is drawn at random."""
 
-    def __init__(self, key: Key, number: bytes, now: float) -> None:
+    def __init__(self, key: Key, draw: Callable[[int], bytes], now: float) -> None:
         self._key = key
-        self._number = number
-        self._until = now + LISTEN_S
+        self._draw = draw
+        self._number = draw(CONTACT_NUMBER_SIZE)
+        self._until = inf
+        """When answers need not be awaited any more, from the first question on."""
         self.due_at = now
         """When to ask, in s."""
-        self._has_asked = self._is_answered = False
+        self._has_asked = self.is_answered = False
         self._heard = 0
         self._made_at = inf
         """When the key was made, by what others say, on the link's clock."""
 
     def ask(self, now: float) -> LostNumbers:
         """The question to be sent at `now`."""
-        self._has_asked = True
+        if not self._has_asked:
+            self._has_asked, self._until = True, now + LISTEN_S
         self.due_at = now + (ASK_S if now < self._until else LATER_S)
         return LostNumbers(self._key.kid, self._key.fingerprint[:KEY_PREFIX_SIZE], self._number)
 
@@ -79,7 +95,7 @@ class Resuming:
         """Note what another robot has answered."""
         if found.number != self._number or found.kid != self._key.kid:
             return
-        self._is_answered = True
+        self.is_answered = True
         self._heard = max(self._heard, found.newest)
         if found.age is not None:
             self._made_at = min(self._made_at, at - found.age / TICKS_PER_S)
@@ -92,22 +108,36 @@ class Resuming:
         if now < self._until:
             return None
         known_s = max(-inf if age_s is None else age_s, now - self._made_at)
-        by_age = most_ticks(known_s) if known_s > -inf else None
-        if by_age is not None and self._heard < LAST_QUARTER:
-            return max(by_age, self._heard)
-        if not self._heard:
-            return None
-        unheard = round(UNHEARD_S * TICKS_PER_S)
-        return min(max(self._heard, LAST_QUARTER, by_age or 0) + unheard, N_TICKS)
+        if known_s > -inf and self._heard < LAST_QUARTER:
+            by_age = most_ticks(self._key, known_s)
+            if self._heard < by_age:
+                # The last quarter is for those who do not know the age.
+                return by_age if by_age < LAST_QUARTER else N_TICKS
+        return self._anywhere() if self._heard else None
+
+    def is_above(self, newest: int) -> bool:
+        """Whether others have heard a T of this robot above `newest`, its own."""
+        return self._heard > newest
+
+    def is_over(self, now: float) -> bool:
+        """Whether no more answers are awaited."""
+        return self.is_answered or now > self._until + STILL_S
+
+    def _anywhere(self) -> int:
+        """A T in the last quarter, above all that was heard and a day of use."""
+        least = max(self._heard, LAST_QUARTER) + round(UNHEARD_S * TICKS_PER_S)
+        room = max(0, N_TICKS - least) // PARTS
+        return min(least + room * int.from_bytes(self._draw(4)) // (1 << 32), N_TICKS)
 
     def words(self, now: float) -> str:
         """Why nothing is sealed at `now`, as sentences; empty if nothing was to be sent."""
         if not self._has_asked:
+            # Who only receives needs no numbers.
             return ""
         lost = f"the numbers of key {self._key.kid} are lost here"
         if now < self._until:
             return f"{lost}: the other robots are asked for {ceil(self._until - now)} more seconds"
-        who = "has heard this robot use it" if self._is_answered else "answers"
+        who = "has heard this robot use it" if self.is_answered else "answers"
         return (
             f"{lost}, no robot {who}, and its age is not known. If this robot never used it: "
             "sdrlinkctl key install --new. Otherwise bring a robot that has heard it into reach, "
@@ -144,6 +174,7 @@ class Recalling:
         return asked
 
 
-def is_ahead(numbers: Numbers, age_s: float, now: float) -> bool:
+def is_ahead(numbers: Numbers, key: Key, age_s: float, now: float) -> bool:
     """Whether the key time is ahead of what a robot without state would expect of it."""
-    return numbers.clock(now) * TICKS_PER_S > most_ticks(age_s)
+    ticks = numbers.clock(now) * TICKS_PER_S if numbers.has_begun else numbers.newest
+    return ticks > most_ticks(key, age_s)

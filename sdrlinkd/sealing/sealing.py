@@ -7,12 +7,21 @@ from sdrlinkd.reports import SecurityReport
 from sdrlinkd.sealing.contacts import PATIENCE_S, Contacts
 from sdrlinkd.sealing.held_keys import HeldKeys
 from sdrlinkd.sealing.keys import Key
-from sdrlinkd.sealing.numbers import Numbers
+from sdrlinkd.sealing.numbers import LEAP_S, Numbers
 from sdrlinkd.sealing.opener import Opener
 from sdrlinkd.sealing.params import SecurityParams
 from sdrlinkd.sealing.peers import Peers
 from sdrlinkd.sealing.remembered import Memory, Remembered
-from sdrlinkd.sealing.resuming import DAY_S, Ages, Recalling, Resuming, is_ahead
+from sdrlinkd.sealing.resuming import (
+    DAY_S,
+    LAST_QUARTER,
+    PACE,
+    Ages,
+    Recalling,
+    Resuming,
+    is_ahead,
+    most_ticks,
+)
 from sdrlinkd.sealing.strangers import Strangers
 from sdrlinkd.wire import (
     CONTACT_NUMBER_SIZE,
@@ -102,8 +111,10 @@ class Sealing:
 
     def may_send(self, start: float, seq: int, n: int) -> bool:
         """Whether a burst at `start` can hold `n` PDUs of ours from `seq` on."""
-        if self._numbers.is_lost:
+        if self._numbers.is_lost or self._is_early(start):
             return False
+        if not self._numbers.has_begun:
+            self._lost_words = ""
         self._is_used_up = self._numbers.is_used_up(start)
         if not self._numbers.is_out(start):
             self._out_since = inf
@@ -235,20 +246,45 @@ class Sealing:
         heard_at = {src: peer.heard_at for src, peer in self._peers if src != self._own_id}
         if self._keys.look(now, heard_at):
             self._changed()
-        if self._numbers.is_lost:
+        if self._numbers.is_lost or self.opener.resuming is not None:
             self._resume(now)
 
     def _resume(self, now: float) -> None:
-        """Ask for lost numbers, and go on once it is known which ones were used."""
-        key, resuming = self._keys.own.key, self.opener.resuming
+        """Ask for lost numbers, and go on once it is known which ones were used.
+
+        Who goes on by the age of the key alone looks for answers a while longer.
+        """
+        numbers, key, resuming = self._numbers, self._keys.own.key, self.opener.resuming
         if resuming is None:
-            resuming = self.opener.resuming = Resuming(key, self._draw(CONTACT_NUMBER_SIZE), now)
-        floor = resuming.floor(now, self._ages.age_s(key, now))
-        self._lost_words = resuming.words(now)
-        if floor is not None:
-            self._numbers.resume(floor)
-            self._contacts.met_somebody(now)
-            self.opener.resuming, self._lost_words = None, ""
+            resuming = self.opener.resuming = Resuming(key, self._draw, now)
+        if numbers.is_lost or resuming.is_above(numbers.newest):
+            floor = resuming.floor(now, self._ages.age_s(key, now))
+            if floor is not None:
+                numbers.resume(floor)
+                self.memory.resumed(key.fingerprint)
+                self._contacts.met_somebody(now)
+        self._lost_words = resuming.words(now) if numbers.is_lost else ""
+        if not numbers.is_lost and resuming.is_over(now):
+            self.opener.resuming = None
+
+    def _is_early(self, start: float) -> bool:
+        """Whether a start came so soon after others that, by the age of the key alone, a robot that
+        has lost its numbers would not be above ours.
+        """
+        numbers, key = self._numbers, self._keys.own.key
+        if numbers.has_begun or key.fingerprint not in self.memory.on_disk.resumed:
+            return False
+        age_s = self._ages.age_s(key, start)
+        if age_s is None or numbers.newest >= LAST_QUARTER:
+            return False
+        early_s = (numbers.newest - most_ticks(key, age_s)) / TICKS_PER_S - LEAP_S
+        if early_s <= 0:
+            return False
+        self._lost_words = (
+            f"the numbers of key {key.kid} were lost, and the daemon has started again soon: it "
+            f"seals again in {ceil(early_s / PACE)} s"
+        )
+        return True
 
     def _changed(self) -> None:
         """Go on with another key; nothing leaves before its floor is on disk."""
@@ -295,7 +331,8 @@ class Sealing:
                 "sdrlinkctl key rotate"
             )
         age_s = self._ages.age_s(key, now)
-        if age_s is not None and is_ahead(self._numbers, age_s, now):
+        was_lost = key.fingerprint in self.memory.on_disk.resumed
+        if age_s is not None and not was_lost and is_ahead(self._numbers, key, age_s, now):
             found.append(
                 f"the daemon was restarted so often that its numbers of key {key.kid} are ahead of "
                 "the key's age: if this robot loses its state, make the next key"
@@ -322,6 +359,7 @@ class Sealing:
             key_days_left=None if self._numbers.is_lost else self._days_left(now),
             waits=self._waits,
             halted=self.halted,
+            strangers=self._strangers.notices(now),
             copies=self._copies(),
         )
 

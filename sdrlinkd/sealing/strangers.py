@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import inf
 
 from sdrlinkd.sealing.held_keys import HeldKeys
+from sdrlinkd.sealing.words import words_of
 from sdrlinkd.wire import KeyTold
 
 TELL_S = 5.0
@@ -96,7 +97,7 @@ class Strangers:
                 )
             elif now - each.clear_at < FORGET_S:
                 found.append(
-                    f"robot {src} sends in the clear and is not heard: give it the team's key, or "
+                    f"robot {src} is heard, but sends in the clear: give it the team's key, or "
                     'set security.clear = "accept" here'
                 )
             elif now - each.old_at < FORGET_S:
@@ -114,8 +115,8 @@ class Strangers:
     def _does_not_open(self, src: int, stranger: _Stranger, now: float) -> str:
         if self._keys is None:
             return (
-                f"robot {src} seals its PDUs, and this robot has no key: set security.mode here, "
-                "and install the team's key: sdrlinkctl key install"
+                f"robot {src} is heard, but seals its PDUs, and this robot has no key: set "
+                "security.mode here, and install the team's key: sdrlinkctl key install"
             )
         own_keys = self._keys.by_kid
         told = stranger.told if now - stranger.told_at < FORGET_S else None
@@ -123,27 +124,29 @@ class Strangers:
             ours = ", ".join(str(kid) for kid in sorted(own_keys))
             if stranger.kid not in own_keys:
                 return (
-                    f"robot {src} seals with key {stranger.kid}, which is not installed here "
-                    f"(installed: {ours}); {_MENDS}"
+                    f"robot {src} is heard, but uses key {stranger.kid}, which is not installed "
+                    f"here (installed: {ours}); {_MENDS}"
                 )
-            return f"PDUs of robot {src} do not open with key {stranger.kid}; {_MENDS}"
+            return (
+                f"robot {src} is heard, but its PDUs do not open with key {stranger.kid}; {_MENDS}"
+            )
         held = own_keys.get(told.kid)
         own = None if held is None else self._keys.told(held.key)
         if own is None or own.fingerprint != told.fingerprint:
-            ours = "none" if own is None else own.fingerprint.hex()
+            ours = "none" if own is None else f"{words_of(own.fingerprint)} …"
             return (
-                f"robot {src} has another key {told.kid}: its fingerprint begins with "
-                f"{told.fingerprint.hex()}, ours with {ours}; {_MENDS}"
+                f"robot {src} is heard, but uses another key {told.kid} "
+                f"({words_of(told.fingerprint)} …; ours: {ours}); {_MENDS}"
             )
         if own.is_auth != told.is_auth:
             modes = {False: "seal", True: "auth"}
             return (
-                f"robot {src} has the same key in the mode {modes[told.is_auth]}, and this robot "
-                f"in the mode {modes[own.is_auth]}: give both the same security.mode"
+                f"robot {src} is heard, but uses the mode {modes[told.is_auth]}, and this robot "
+                f"{modes[own.is_auth]}: give both the same security.mode"
             )
         return (
-            f"PDUs of robot {src} do not open although it has our key {told.kid}: they are damaged "
-            "or forged"
+            f"robot {src} is heard, but its PDUs do not open although it has our key {told.kid}: "
+            "they are damaged or forged"
         )
 
     def _differs(self, told: KeyTold) -> bool:

@@ -69,10 +69,10 @@ def test_what_is_idle_takes_one_line():
 
 
 @pytest.mark.parametrize(("level", "reasons", "line"), [
-    ("OK", [], "OK"),
-    ("DOWN", ["no radio since 12 s"], "DOWN: no radio since 12 s"),
+    ("OK", [], "OK, sealed"),
+    ("DOWN", ["no radio since 12 s"], "DOWN, sealed: no radio since 12 s"),
     ("DEGRADED", ["robot 2 hears us at 3 dB, 4 % lost", "b"],
-     "DEGRADED: robot 2 hears us at 3 dB, 4 % lost; b"),
+     "DEGRADED, sealed: robot 2 hears us at 3 dB, 4 % lost; b"),
 ])  # fmt: skip
 def test_line_1_is_the_verdict(level, reasons, line):
     told = VerdictReport(level=level, reasons=reasons)

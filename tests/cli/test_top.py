@@ -83,8 +83,8 @@ async def test_of_a_quiet_daemon_all_is_seen():
     async with make_app().run_test(size=(80, 24)) as pilot:
         await shown(pilot, [SNAPSHOT])
         text = text_of(pilot.app)
-    for part in ("DEGRADED: robot 2 has a different registry", "/robot_1/odom", "/rx_robot_2/odom",
-                 "/imu", "15.5", "SNR dB"):  # fmt: skip
+    verdict = "DEGRADED, sealed: robot 2 has a different registry"
+    for part in (verdict, "/robot_1/odom", "/rx_robot_2/odom", "/imu", "15.5", "SNR dB"):
         assert part in text
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher, Subscriber
-from sdrlinkd.keyring import KeyFile, create_key_file, new_key
+from sdrlinkd.keyring import KeyFile, create_key_file, new_key, read_key_file
 from sdrlinkd.wire import LostNumbers, parse, read_control_entries
 from tests.programs import sdrlinkd
 from tests.sealing import vectors
@@ -185,6 +185,10 @@ def test_key_install_says_what_is_left_to_do(write_config, folder, ports, key_fi
     assert run([*line, "--replace"]) == 0
 
 
+def fingerprint(path):
+    return read_key_file(path).key[0].fingerprint.hex()[:16]
+
+
 def states(folder):
     return sorted((folder / "state" / "sdrlinkd").glob("*.json"))
 
@@ -213,6 +217,13 @@ def test_numbers_that_are_lost_are_not_begun_again(write_config, folder, ports, 
     assert run(["key", "rotate", str(folder / "next.key"), "--config", str(path)]) == 0
     code, said = install(folder / "next.key")
     assert (code, "not here" in said, len(states(folder))) == (0, False, 2)
+    # What is damaged counts as lost, however the key is installed again.
+    (file,) = [each for each in states(folder) if fingerprint(folder / "next.key") in each.name]
+    file.write_bytes(file.read_bytes()[:40])
+    for how in ((), ("--replace",), ("--no-copy",)):
+        code, said = install(*how, folder / "next.key")
+        assert (code, "the numbers of key 1 are not here" in said) == (0, True), how
+        assert len(file.read_bytes()) == 40
     for each in states(folder):
         each.unlink()
     code, said = install("--replace", folder / "next.key")

@@ -14,27 +14,23 @@ class Fault(NamedTuple):
     at: int
     level: str
     reason: str
-    is_sealed: bool = False
-
-    @property
-    def first_line(self) -> str:
-        """How the first line of `sdrlinkctl status` begins."""
-        seal = "sealed" if self.is_sealed else "in the clear"
-        return f"{self.level}, {seal}" + (f": {self.reason}" if self.reason else "")
 
 
-FAULTS = (
-    Fault("nothing, with a key", 1, "OK", "", is_sealed=True),
+SEALED = (
+    Fault("nothing, with a key", 1, "OK", ""),
+    Fault("robot 2 has another key", 1, "DOWN", "robot 2 is heard, but uses another key"),
+    Fault("robot 2 has another key", 2, "DOWN", "robot 1 is heard, but uses another key"),
+    Fault("robot 2 has no key", 1, "DOWN", "robot 2 is heard, but sends in the clear"),
+    Fault("robot 2 has the key in the mode auth", 1, "DOWN", "robot 2 is heard, but uses the mode"),
+    Fault("robot 2 lost the numbers of its key", 2, "DOWN", "the numbers of key 0 are lost here"),
+    Fault("robot 2 lost the numbers of its key", 1, "DEGRADED", "robot 2 has lost"),
+    Fault("the disk of robot 1's state is full", 1, "DOWN", "the numbers of sealed PDUs cannot be"),
+    Fault("another robot has our id and key", 1, "DOWN", "another robot has our id 1 and our key"),
+)  # fmt: skip
+"""With a key: the first line begins with the level and `, sealed`."""
+IN_THE_CLEAR = (
     Fault("nothing, without a key", 1, "OK", ""),
-    Fault("robot 2 has another key", 1, "DOWN", "robot 2 is heard, but uses another key", is_sealed=True),
-    Fault("robot 2 has another key", 2, "DOWN", "robot 1 is heard, but uses another key", is_sealed=True),
-    Fault("robot 2 has no key", 1, "DOWN", "robot 2 is heard, but sends in the clear", is_sealed=True),
     Fault("robot 2 has no key", 2, "DOWN", "robot 1 is heard, but seals its PDUs"),
-    Fault("robot 2 has the key in the mode auth", 1, "DOWN", "robot 2 is heard, but uses the mode", is_sealed=True),
-    Fault("robot 2 lost the numbers of its key", 2, "DOWN", "the numbers of key 0 are lost here", is_sealed=True),
-    Fault("robot 2 lost the numbers of its key", 1, "DEGRADED", "robot 2 has lost", is_sealed=True),
-    Fault("the disk of robot 1's state is full", 1, "DOWN", "the numbers of sealed PDUs cannot be", is_sealed=True),
-    Fault("another robot has our id and key", 1, "DOWN", "another robot has our id 1 and our key", is_sealed=True),
     Fault("robot 2 has another network id", 1, "DOWN", "robot 2 is heard, but in another"),
     Fault("robot 2 has another PDU size", 1, "DOWN", "a robot is heard, but with another"),
     Fault("robot 2 has another registry", 1, "DEGRADED", "robot 2 has a different topic"),
@@ -57,3 +53,4 @@ FAULTS = (
     Fault("a loopback without CPU", 1, "DEGRADED", "the CPU is too slow"),
     Fault("robot 1 stops", 1, "DEGRADED", "stopping"),
 )  # fmt: skip
+"""Without one: the first line begins with the level and `, in the clear`."""

@@ -1,8 +1,10 @@
 """A verdict states the worst first, with its reason."""
 
 import pytest
+from msgspec.structs import replace
 
 from sdrlinkd.health import Health
+from sdrlinkd.reports import ReceivedTopicReport, SecurityReport
 from tests.health.snapshots import robot, snapshot, topic
 
 
@@ -113,7 +115,7 @@ def test_a_machine_that_is_too_slow_and_a_receiver_that_clips():
     assert verdict(*lost) == (
         "DEGRADED",
         [
-            "5000 samples dropped in 5 s: the CPU is too slow",
+            "the CPU is too slow: 5000 samples dropped in 5 s",
             "the receiver clips 1.3 % of the samples: lower its gain",
             "the event loop lags 300 ms: the CPU is busy",
         ],
@@ -142,3 +144,59 @@ def test_stopping_comes_first():
     level, reasons = verdict(snapshot(robots=[], state="draining"))
     assert level == "DEGRADED"
     assert reasons[0].startswith("stopping")
+
+
+@pytest.mark.parametrize(
+    ("robots", "told"),
+    [
+        # Alone, nothing else matters; beside others, it comes before how these are heard.
+        ([], ("DOWN", ["robot 5 is heard, but uses another key"])),
+        (
+            [robot(per_there=0.1, snr_there_db=9.0)],
+            (
+                "DEGRADED",
+                ["robot 5 is heard, but uses another key", "robot 2 hears us at 9 dB, 10 % lost"],
+            ),
+        ),
+    ],
+)
+def test_who_is_not_believed_is_named_first(robots, told):
+    security = SecurityReport(strangers=["robot 5 is heard, but uses another key"])
+    seen = snapshot(robots=robots)
+    seen = replace(seen, link=replace(seen.link, security=security))
+    assert verdict(seen) == told
+    health = Health()
+    logged = [line.text for _ in range(3) for line in health.look(seen)]
+    assert logged.count("robot 5 is heard, but uses another key") == 1
+
+
+def test_a_cpu_that_is_too_slow_explains_what_we_do_not_hear():
+    lossy = robot(per_lately=0.6, snr_db=20.0)
+    before, after = (
+        snapshot(at, carrier={"counters": {"samples_lost": n}}, robots=[lossy])
+        for at, n in ((10.0, 0), (12.0, 5000))
+    )
+    assert verdict(before) == ("DEGRADED", ["we hear robot 2 at 20 dB, 60 % lost"])
+    assert verdict(before, after) == (
+        "DEGRADED", ["the CPU is too slow: 5000 samples dropped in 5 s"],
+    )  # fmt: skip
+
+
+def test_old_messages_are_named_where_they_wait_and_where_they_come():
+    waits = topic("/robot_1/odom", queued=224, queue_ms=40_000.0, accepted_per_s=5.0)
+    slow = topic("/robot_1/map", queued=1, queue_ms=9_000.0, accepted_per_s=0.5)
+    seen = snapshot(topics=[slow, waits])
+    late = ReceivedTopicReport(
+        src=2, topic_id=0, name="odom", republished_as="/rx_robot_2/odom",
+        age_ms_p50=43_953.5, delivered_per_s=5.0,
+    )  # fmt: skip
+    seen = replace(seen, link=replace(seen.link, received=[late]))
+    assert verdict(seen) == (
+        "DEGRADED",
+        ["/rx_robot_2/odom is 44 s old", "/robot_1/odom waits 40 s in the queue"],
+    )
+    # What came once, and comes no more, is not judged by its age.
+    seen = replace(
+        seen, link=replace(seen.link, topics=[], received=[replace(late, delivered_per_s=0.0)])
+    )
+    assert verdict(seen) == ("OK", [])

@@ -12,10 +12,10 @@ from sdrlinkd.keyring import (
     new_key,
     parse_key_file,
     read_key_file,
-    words_of,
     write_key_file,
 )
 from sdrlinkd.keyring.testing import CONSTANTS
+from sdrlinkd.sealing import words_of
 
 SECRET = "AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8="
 PAIR = "ICEiIyQlJicoKSorLC0uLzAxMjM0NTY3ODk6Ozw9Pj8="

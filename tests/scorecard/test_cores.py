@@ -177,11 +177,11 @@ def test_row_22_robots_that_lost_their_disks(lasting, figure):
     """A life lasts for half a day at most; one in three ends with another disk."""
     chance, lives, lost, refused, numbers = Random(22), 0, 0, 0, 0
     for _ in lasting():
-        machine = Machine()
+        machine = Machine(chance.random())
         for _ in range(200):
             keys = [KEY] if chance.random() < 0.5 else [KEY, NEXT]
             if chance.random() < 1 / 3:
-                machine.do("lose", (keys, chance.random() < 0.5, chance.random() < 0.7))
+                machine.do("lose", (keys, *(chance.random() < 0.7 for _ in range(3))))
                 lost += 1
             else:
                 machine.do("restart", keys)

@@ -1,5 +1,7 @@
 """A robot's sealing and what its disk keeps of it, or does not."""
 
+from random import Random
+
 from sdrlinkd.sealing import Remembered, Sealing
 from sdrlinkd.wire import (
     BROADCAST,
@@ -20,28 +22,36 @@ class Machine:
     """One robot's sealing over its lives, and every number that it has used.
 
     `age_s` is true time since its keys were made. `is_synchronized`: its host knows that, too.
-    `in_reach`: another robot hears what it sends, and answers.
+    `is_heard`: another robot hears what it sends; `is_answered`: it hears what that one answers.
     """
 
-    def __init__(self):
+    def __init__(self, seed=1):
+        self._chance = Random(seed)
         self.disk, self.disk_is = NEW, "works"
         self.now, self.seq = 0.0, 0
         self.used, self.sent = set(), 0
         self.last = []
-        self.age_s, self.is_synchronized, self.in_reach = 0.0, True, True
+        self.age_s = 0.0
+        self.is_synchronized = self.is_heard = self.is_answered = True
         self.heard, self.answers = {KEY: 0, NEXT: 0}, 0
         self.restart([KEY])
 
     def restart(self, keys):
         usable = [key for key in keys if key.fingerprint not in self.disk.retired]
         keys = usable or [key for key in (KEY, NEXT) if key.fingerprint not in self.disk.retired]
-        self.sealing = Sealing(1, SIZE, SEALED, keys, self.disk, lambda n: bytes(n))
-        self.now, self.last = 0.0, []
+        self.sealing = Sealing(1, SIZE, SEALED, keys, self.disk, self._chance.randbytes)
+        # Each life begins with the same sequence number, so that equal T are equal numbers.
+        self.now, self.last, self.seq = 0.0, [], 0
         self.sealing.look(0.0)
 
-    def lose(self, keys, is_synchronized, in_reach):
+    def lose(self, keys, is_synchronized, is_heard, is_answered):
         """Another disk, with the same keys."""
-        self.disk, self.is_synchronized, self.in_reach = Remembered(), is_synchronized, in_reach
+        self.disk = Remembered()
+        self.is_synchronized, self.is_heard, self.is_answered = (
+            is_synchronized,
+            is_heard,
+            is_answered,
+        )
         self.restart(keys)
 
     def resume(self):
@@ -52,7 +62,7 @@ class Machine:
         sealing.look(self.now)
         if sealing.is_lost and sealing.clear_due_at <= self.now:
             question = in_pdu(SIZE, 1, sealing.told_in_clear(self.now))
-            if self.in_reach:
+            if self.is_answered:
                 sealing.opener.open(self.answer(question), self.now)
             sealing.look(self.now)
 
@@ -98,7 +108,7 @@ class Machine:
         number = (pdu.kid, pdu.ticks, pdu.seq)
         assert number not in self.used
         self.used.add(number)
-        if self.in_reach:
+        if self.is_heard:
             key = NEXT if pdu.kid else KEY
             self.heard[key] = max(self.heard[key], pdu.ticks)
 
@@ -110,6 +120,8 @@ class Machine:
             self.now += value
             self.age_s += max(value, 0.0)
             self.resume()
+        elif kind == "off":
+            self.age_s += value
         elif kind == "late" and self.last:
             # It did not leave, and is sealed anew, as its content depends on the start.
             inner, start = self.last[-1]

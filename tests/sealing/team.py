@@ -30,7 +30,7 @@ from sdrlinkd.sealing import Key, Remembered, Sealing, SecurityParams
 from sdrlinkd.wire import make_registry
 
 KEY = Key(0, bytes(range(32)))
-NEXT = Key(1, bytes(range(32, 64)))
+NEXT = Key(1, bytes(range(32, 64)), follows=True)
 SEALED = SecurityParams(mode="seal")
 NEW = Remembered({KEY.fingerprint: 0, NEXT.fingerprint: 0})
 """What is on disk of two keys that were never used."""

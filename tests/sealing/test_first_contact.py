@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from sdrlinkd.link import AccessParams, RelayParams
-from sdrlinkd.sealing import Remembered, SecurityParams
+from sdrlinkd.sealing import Remembered, SecurityParams, words_of
 from tests.sealing.team import KEY, NEXT, Robot, Team
 
 CDR = b"\0\1\0\0"
@@ -110,9 +110,9 @@ def test_two_robots_with_different_keys_say_so_within_5_s():
     team.run(5.0)
     for each in (1, 2):
         (notice,) = [n for n in notices(team, each) if "another key 0" in n]
-        assert f"robot {3 - each} has another key 0" in notice
-        assert other(NEXT).fingerprint[:4].hex() in notice
-        assert KEY.fingerprint[:4].hex() in notice
+        assert f"robot {3 - each} is heard, but uses another key 0" in notice
+        assert words_of(other(NEXT).fingerprint[:4]) in notice
+        assert words_of(KEY.fingerprint[:4]) in notice
     assert dropped(team, 1)["sec_bad_tag"] > 0
     assert dropped(team, 1)["sec_cleartext"] == 1
 
@@ -125,17 +125,19 @@ def other(key):
 def test_a_key_that_is_not_installed():
     team = Team(Robot(1, [KEY]), Robot(2, [NEXT]))
     team.run(5.0)
-    assert any(
-        "has another key 1" in each and "ours with none" in each for each in notices(team, 1)
-    )
+    assert any("uses another key 1" in each and "ours: none" in each for each in notices(team, 1))
     assert dropped(team, 1)["sec_unknown_kid"] > 0
 
 
 def test_one_key_in_two_modes():
     team = Team(Robot(1, [KEY]), Robot(2, [KEY], SecurityParams(mode="auth")))
     team.run(5.0)
-    assert any("in the mode auth" in each and "security.mode" in each for each in notices(team, 1))
-    assert any("in the mode seal" in each and "security.mode" in each for each in notices(team, 2))
+    assert any(
+        "uses the mode auth" in each and "security.mode" in each for each in notices(team, 1)
+    )
+    assert any(
+        "uses the mode seal" in each and "security.mode" in each for each in notices(team, 2)
+    )
 
 
 def test_a_robot_without_a_key():
@@ -143,8 +145,8 @@ def test_a_robot_without_a_key():
     send(team, 2)
     team.run(3.0)
     assert team.robots[1].heard == team.robots[2].heard == []
-    assert any("robot 2 sends in the clear" in each for each in notices(team, 1))
-    assert any("robot 1 seals its PDUs, and this robot has no key" in n for n in notices(team, 2))
+    assert any("robot 2 is heard, but sends in the clear" in each for each in notices(team, 1))
+    assert any("robot 1 is heard, but seals its PDUs" in n for n in notices(team, 2))
     assert dropped(team, 1)["sec_cleartext"] > 0
     assert dropped(team, 2)["rx_flags"] > 0
 

@@ -112,7 +112,7 @@ def test_of_a_robot_that_holds_our_key_now_nobody_is_told():
     two, other = robot(2), robot(1, (NEXT,))
     assert refusal(two, other.seal(pdu(1), 1.0), 1.0) == "sec_unknown_kid"
     (told,) = two.notices(1.0)
-    assert "robot 1 seals with key 1, which is not installed here" in told
+    assert "robot 1 is heard, but uses key 1, which is not installed here" in told
     opened(robot(1), two, 1.1, 2)
     assert two.notices(1.2) == []
 

@@ -5,7 +5,7 @@ from math import inf
 
 import pytest
 
-from sdrlinkd.sealing import Key
+from sdrlinkd.sealing import Key, words_of
 from sdrlinkd.sealing.testing import HeldKeys, Strangers
 from sdrlinkd.wire import KeyTold
 from tests.sealing.team import KEY, NEXT
@@ -24,20 +24,25 @@ def tells(key, is_auth=False):
 @pytest.mark.parametrize(
     ("note", "words"),
     [
-        (lambda s: s.closed(5, 2, 10.0), "robot 5 seals with key 2, which .*installed: 0, 1"),
-        (lambda s: s.closed(5, 1, 10.0), "PDUs of robot 5 do not open with key 1; compare"),
-        (lambda s: s.clear(5, 10.0), "robot 5 sends in the clear and is not heard"),
+        (
+            lambda s: s.closed(5, 2, 10.0),
+            "robot 5 is heard, but uses key 2, which .*installed: 0, 1",
+        ),
+        (
+            lambda s: s.closed(5, 1, 10.0),
+            "robot 5 is heard, but its PDUs do not open with key 1; compare",
+        ),
+        (lambda s: s.clear(5, 10.0), "robot 5 is heard, but sends in the clear"),
         (lambda s: s.old(5, 10.0), "PDUs of robot 5 have old numbers"),
         (lambda s: s.late(5, 10.0), "PDUs of robot 5 come later than they say"),
         (
             lambda s: s.tells(5, tells(OTHER), 10.0),
-            f"another key 0: .* {OTHER.fingerprint[:4].hex()}, ours with "
-            + KEY.fingerprint[:4].hex(),
+            " …; ours: ".join(words_of(each.fingerprint[:4]) for each in (OTHER, KEY)),
         ),
-        (lambda s: s.tells(5, KeyTold(3, False, b"abcd"), 10.0), "another key 3.* ours with none"),
+        (lambda s: s.tells(5, KeyTold(3, False, b"abcd"), 10.0), "another key 3.*; ours: none"),
         (
             lambda s: s.tells(5, tells(NEXT, True), 10.0),
-            "robot 5 has the same key in the mode auth, and this robot in the mode seal",
+            "robot 5 is heard, but uses the mode auth, and this robot seal",
         ),
     ],
 )
@@ -90,7 +95,7 @@ def test_without_keys_a_robot_that_seals_is_told():
     found.closed(5, 1, 10.0)
     assert found.key_due_at == inf, "there is none to tell"
     (notice,) = found.notices(39.9)
-    assert notice.startswith("robot 5 seals its PDUs, and this robot has no key")
+    assert notice.startswith("robot 5 is heard, but seals its PDUs, and this robot has no key")
     found.tells(6, tells(KEY), 20.0)
     assert [each[:7] for each in found.notices(25.0)] == ["robot 5", "robot 6"]
 

@@ -66,7 +66,7 @@ class _Block:
 def verdict(snapshot: Snapshot, width: int, *, whole: bool = False) -> Text:
     """The verdict's level, and as many of its reasons as two lines hold, or all if `whole`."""
     level, reasons = snapshot.verdict.level, snapshot.verdict.reasons
-    told = level + (", in the clear" if snapshot.link.security.mode == "off" else "")
+    told = f"{level}, {'in the clear' if snapshot.link.security.mode == 'off' else 'sealed'}"
     room = REASON_LINES * width - len("; + 99 more reasons: --all")
     for at, reason in enumerate(reasons):
         longer = f"{told}{'; ' if at else ': '}{reason}"

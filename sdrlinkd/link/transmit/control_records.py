@@ -48,6 +48,8 @@ MOST_RECEIPTS = 256
 ROUTES_SHARE = FLOWS_SHARE = 0.02
 """Largest shares of the airtime for PDUs with only LSA, ROUTE, and answers to them, and with only
 FLOWS and ADMIT; the latter is that of all robots together."""
+FOUND_SHARE = 0.02
+"""Largest share of the airtime of all robots for PDUs with only answers about lost numbers."""
 UNANSWERED = 4
 """How many robots share the airtime for records, whether they hear us or not."""
 MOST_BEACON_S = 5.0
@@ -74,6 +76,7 @@ class ControlRecords:
         self._routes = routes
         self._route_budget = Budget(ROUTES_SHARE)
         self._air_budget = Budget(FLOWS_SHARE)
+        self._found_budget = Budget(FOUND_SHARE)
         self._own_id = own_id
         self._clear_size = clear_size
         self._params = params
@@ -211,6 +214,7 @@ class ControlRecords:
             key = (RecordType.WANTED, wanted.node, *wanted.topics[:1])
             self._piggyback.put_as(key, wanted, self._alone_from(now + PATIENCE_S))
         self._offer_contact(now)
+        self._offer_found(now, pdu_s)
         self._offer_topics(now)
         if self._piggyback.holds(RecordType.TOPIC) and self._teller.may_pay(now, pdu_s):
             self._piggyback.make_due(RecordType.TOPIC, self._room, now)
@@ -265,9 +269,16 @@ class ControlRecords:
         if now >= self._sealing.contact_due_at:
             contact, alone_at = self._sealing.contact(now, self._room)
             self._piggyback.put(contact, self._alone_from(alone_at))
+
+    def _offer_found(self, now: float, pdu_s: float) -> None:
+        """Answer robots that have lost their numbers; anybody can ask, so this has a share."""
+        if self._piggyback.holds(RecordType.FOUND):
+            return
         for found in self._sealing.found(now):
-            key = RecordType.FOUND, found.node
-            self._piggyback.put_as(key, found, self._alone_from(now + PATIENCE_S))
+            key = RecordType.FOUND, found.node, int.from_bytes(found.number)
+            free_at = self._found_budget.free_at(now)
+            self._piggyback.put_as(key, found, max(self._alone_from(now + PATIENCE_S), free_at))
+            self._found_budget.spend((1 + self._n_others) * pdu_s, now, is_bounded=True)
 
     def _offer_topics(self, now: float) -> None:
         self._told_version = self._teller.topics.version
