@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import os
 import signal
 import sys
 from pathlib import Path
@@ -12,11 +13,15 @@ from sdrlinkd.descriptors import raise_limit
 from sdrlinkd.errors import UserError
 from sdrlinkd.journal import log_to_stderr
 from sdrlinkd.parent import end_with_parent
+from sdrlinkd.shipped import shipped_files
 
 if TYPE_CHECKING:
     from sdrlinkd.config import Setup
 
 DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
+SERVICE = "INVOCATION_ID"
+"""Variable that systemd sets for a service."""
+log = logging.getLogger("sdrlinkd")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -27,10 +32,11 @@ def main(arguments: list[str] | None = None) -> int:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     log_to_stderr(logging.getLevelNamesMapping()[options.log_level.upper()])
     try:
+        path = options.config or _usual()
         if options.check:
-            sys.stdout.write("\n".join([*_checked(_read(options.config)), ""]))
+            sys.stdout.write("\n".join([*_checked(_read(path)), ""]))
             return 0
-        _run(options.config)
+        _run(path)
     except UserError as error:
         sys.stderr.write(f"sdrlinkd: {error}\n")
         return 2
@@ -38,6 +44,22 @@ def main(arguments: list[str] | None = None) -> int:
         # Ctrl-C before the daemon has installed its own handler.
         return 130
     return 0
+
+
+def _usual() -> Path:
+    """The configuration where none is named: the host's, or that of a robot that hears itself.
+
+    A service is never without its own.
+    """
+    alone = shipped_files("etc", "", ".toml").get("alone")
+    if DEFAULT_CONFIG.exists() or SERVICE in os.environ or alone is None:
+        return DEFAULT_CONFIG
+    log.info(
+        "without a configuration: robot 1 alone, which hears itself, as in %s; --config FILE names "
+        "another one, and sdrlinkctl init writes one",
+        alone,
+    )
+    return alone
 
 
 def _run(path: Path) -> None:
@@ -87,8 +109,9 @@ def make_parser() -> argparse.ArgumentParser:
         prog="sdrlinkd", description="ROS 2 messages between robots over software radio."
     )
     parser.add_argument(
-        "--config", type=Path, default=DEFAULT_CONFIG, metavar="FILE",
-        help=f"configuration (TOML); default {DEFAULT_CONFIG}",
+        "--config", type=Path, metavar="FILE",
+        help=f"configuration (TOML); default: {DEFAULT_CONFIG}, or else one robot that hears "
+        "itself, for a first look",
     )  # fmt: skip
     parser.add_argument(
         "--check",

@@ -16,7 +16,7 @@ from sdrlinkd.fleet import Election
 from sdrlinkd.link import Outcome, Overrides
 from sdrlinkd.link.receive import SequenceTrack
 from sdrlinkd.wire import Entry, Pdu, build
-from tests.fleet.test_election import LEASE_S, SCORES, TICK_S, faulty, heals
+from tests.fleet.elections import LEASE_S, SCORES, TICK_S, faulty, heals
 from tests.fuzz.corpus import CORPUS
 from tests.fuzz.mutate import mutate
 from tests.fuzz.targets import TARGETS
