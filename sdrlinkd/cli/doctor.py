@@ -80,7 +80,7 @@ def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Findin
             is_timed=radio is not None and radio.is_timed,
         ),
         *_environment(),
-        checks.check_machine_id(_text("etc/machine-id"), _copies(runtime_dir)),
+        checks.check_machine_id(_text("etc/machine-id"), _copies(given)),
         *checks.check_directory(chosen_dir(given), os.getuid()),
         *checks.check_clock(kernel_clock(), step_s, config.chrony.socket),
         *checks.check_limits(checks.granted(), device, ROOT),
@@ -132,12 +132,12 @@ def _text(path: str) -> str:
         return ""
 
 
-def _copies(runtime_dir: Path | None) -> list[int] | None:
+def _copies(given: "str | Path | None") -> list[int] | None:
     """Robots with this machine's id, as a running daemon has heard them; None: none runs."""
     from sdrlinkd.asking import ask_status
 
     try:
-        with connect(runtime_dir) as control:
+        with connect(Path(given) if given else None) as control:
             return ask_status(control).link.security.copies
     except (NoDaemonError, UserError):
         return None

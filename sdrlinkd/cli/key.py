@@ -262,9 +262,10 @@ def _with_robots(key: "StoredKey", installed: "KeyFile | None") -> "StoredKey":
 
 
 def _check_new(keys: "KeyFile", state: "KeyState", robot: int) -> None:
-    """Check that a key file does not tell that the robot used a key. Raises UserError."""
+    """Check that nothing here tells that the robot used a key. Raises UserError."""
     for key in keys.key:
-        if robot in key.robots and not state.knows(key.key):
+        was_used = robot in key.robots or state.has_file(key.key)
+        if was_used and not state.knows(key.key):
             raise UserError(
                 f"--new: robot {robot} has used key {key.kid}, and its numbers in "
                 f"{state.directory} are lost; allowed: install it without --new, or make the next "

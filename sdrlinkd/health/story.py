@@ -10,7 +10,7 @@ from sdrlinkd.health.words import pdu_link_name, span
 from sdrlinkd.reports import NeighborReport, Snapshot, TopicReport
 
 BEGINNING = 20
-"""Characters of a sentence by which those on one robot are known."""
+"""Characters of a sentence by which those on one robot are limited, whatever it claims to be."""
 
 
 class Level(IntEnum):

@@ -26,8 +26,6 @@ BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 SYSTEM_CONFIG, SYSTEM_STATE = Path("/etc/sdrlinkd"), Path("/var/lib")
 OTHER_MACHINE_S = 3600
 """Key time in s that is skipped when a state comes from another machine."""
-
-
 Ticks = Annotated[int, Meta(ge=0, le=N_TICKS)]
 
 
@@ -61,8 +59,6 @@ class KeyState:
         self._robot_id = robot_id
         self._lock: int | None = None
         self._written: dict[bytes, _OfKey] = {}
-        self._whole: set[bytes] = set()
-        """Fingerprints of the keys all of whose numbers are accounted for."""
         self.moved: list[bytes] = []
         """Fingerprints of keys whose state came from another machine."""
 
@@ -105,9 +101,7 @@ class KeyState:
                 self.moved.append(key.fingerprint)
                 floor = min(floor + OTHER_MACHINE_S * TICKS_PER_S, N_TICKS)
             floors[key.fingerprint] = floor
-            if state.is_whole:
-                self._whole.add(key.fingerprint)
-            else:
+            if not state.is_whole:
                 resumed.add(key.fingerprint)
             newest[key.fingerprint] = state.newest
             if state.in_use:
@@ -128,7 +122,7 @@ class KeyState:
                 floor=floor,
                 in_use=fingerprint == remembered.in_use,
                 retired=fingerprint in remembered.retired,
-                is_whole=fingerprint in self._whole,
+                is_whole=fingerprint not in remembered.resumed,
                 newest=dict(remembered.newest.get(fingerprint, {})),
             )
             if self._written.get(fingerprint) != state:
@@ -146,7 +140,6 @@ class KeyState:
     def begin(self, key: Key, owner: tuple[int, int] | None) -> None:
         """Begin the numbers of a key that was never used on this robot. Raises UserError."""
         state = _OfKey(fingerprint=key.fingerprint.hex(), machine=machine_hash(), floor=0)
-        self._whole.add(key.fingerprint)
         try:
             self._write(state, owner)
         except OSError as error:

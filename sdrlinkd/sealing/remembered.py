@@ -91,9 +91,12 @@ class Memory:
             newest[key.fingerprint] = known
         retired = on_disk.retired | self._keys.rotation.retired
         # A key that is out of use stays so, even if its numbers are lost.
-        floors = {**dict.fromkeys(self._keys.rotation.retired, N_TICKS), **on_disk.floors}
+        lost = self._keys.rotation.retired - on_disk.floors.keys()
+        floors = {**on_disk.floors, **dict.fromkeys(lost, N_TICKS)}
         if not self._numbers.is_lost:
             # A floor is never lowered.
             floors[own] = max(floor, on_disk.floors.get(own, 0))
         heard = frozenset(src for each in newest.values() for src in each)
-        return Remembered(floors, newest, own, retired, on_disk.known | heard, on_disk.resumed)
+        return Remembered(
+            floors, newest, own, retired, on_disk.known | heard, on_disk.resumed | lost
+        )

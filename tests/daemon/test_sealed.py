@@ -224,6 +224,8 @@ def test_numbers_that_are_lost_are_not_begun_again(write_config, folder, ports, 
         code, said = install(*how, folder / "next.key")
         assert (code, "the numbers of key 1 are not here" in said) == (0, True), how
         assert len(file.read_bytes()) == 40
+    code, said = install("--new", "--no-copy", folder / "next.key")
+    assert (code, "--new: robot 1 has used key 1" in said) == (2, True)
     for each in states(folder):
         each.unlink()
     code, said = install("--replace", folder / "next.key")

@@ -59,7 +59,7 @@ def test_what_was_replaced_stays_so_and_who_sealed_once_is_known_under_any_key(k
 def test_a_directory_is_whole_once_a_key_was_new_and_not_if_its_numbers_were_lost(kept):
     assert (kept.knows(KEY), kept.knows(NEXT), kept.is_whole) == (True, False, True)
     other = KeyState(kept.directory, 2)
-    other.save(Remembered({KEY.fingerprint: 77}))
+    other.save(Remembered({KEY.fingerprint: 77}, resumed=frozenset({KEY.fingerprint})))
     assert (other.knows(KEY), other.is_whole) == (True, False)
     # It stays so, whatever is written.
     for state in (kept, other):

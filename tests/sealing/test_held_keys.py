@@ -158,6 +158,7 @@ def test_what_was_heard_of_each_robot_is_kept_and_no_floor_is_lowered():
     held.rotation.retired.add(b"new")
     assert kept.wanted(0.0).retired == {b"old", b"new"}
     assert kept.wanted(0.0).floors[b"new"] == N_TICKS, "its numbers are lost; it stays out of use"
+    assert kept.wanted(0.0).resumed == {b"new"}, "and vouches for no other key"
 
 
 def test_what_is_on_disk_of_keys_that_are_installed_is_added():
