@@ -3,14 +3,14 @@
 import ctypes
 from typing import NamedTuple
 
-_UNSYNCHRONISED = 0x0040
+_UNSYNCHRONIZED = 0x0040
 _ERROR = 5
 
 
 class KernelClock(NamedTuple):
     """The kernel's state of this host's clock; `error_s` is the largest error in s."""
 
-    is_synchronised: bool
+    is_synchronized: bool
     error_s: float
 
 
@@ -37,11 +37,11 @@ def kernel_clock() -> KernelClock | None:
         return None
     if state < 0:
         return None
-    is_synchronised = state != _ERROR and not timex.status & _UNSYNCHRONISED
-    return KernelClock(is_synchronised, 1e-6 * timex.max_error)
+    is_synchronized = state != _ERROR and not timex.status & _UNSYNCHRONIZED
+    return KernelClock(is_synchronized, 1e-6 * timex.max_error)
 
 
 def is_synchronized() -> bool:
     """Whether this host's clock is synchronized, by NTP or similar."""
     kernel = kernel_clock()
-    return kernel is not None and kernel.is_synchronised
+    return kernel is not None and kernel.is_synchronized

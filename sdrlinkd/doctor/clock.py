@@ -16,7 +16,7 @@ def check_clock(kernel: KernelClock | None, step_s: float, chrony: str) -> list[
     socket in the configuration, "" for none.
     """
     found = [
-        _synchronised(kernel),
+        _synchronized(kernel),
         good_if(
             abs(step_s) < STEP_S, "clock's steps",
             "none during this check" if abs(step_s) < STEP_S else f"it jumped by {step_s:+.3f} s",
@@ -34,11 +34,11 @@ def check_clock(kernel: KernelClock | None, step_s: float, chrony: str) -> list[
     return found
 
 
-def _synchronised(kernel: KernelClock | None) -> Finding:
+def _synchronized(kernel: KernelClock | None) -> Finding:
     what = "clock"
     if kernel is None:
         return none(what, "the kernel does not report it")
-    if kernel.is_synchronised:
+    if kernel.is_synchronized:
         return good(what, f"synchronized by NTP or similar, within {1e3 * kernel.error_s:.0f} ms")
     return none(
         what,

@@ -2,7 +2,8 @@
 
 It must never use a number twice, and does not know which ones it has used. So it asks, in the
 clear: nobody could open what it would seal. Who holds the key answers, sealed, with the newest T
-heard of it, and with the age of the key. It goes on above both (wire document, 11.6).
+heard of it, and with the age of the key. By these it knows what it cannot have used (wire document,
+11.6).
 """
 
 from collections.abc import Callable

@@ -270,6 +270,9 @@ class Sealing:
     def _is_early(self, start: float) -> bool:
         """Whether a start came so soon after others that, by the age of the key alone, a robot that
         has lost its numbers would not be above ours.
+
+        A host's clock that is set back makes the robot wait for longer, until it is set right, or
+        not trusted any more: then there is no age, and nothing to wait for.
         """
         numbers, key = self._numbers, self._keys.own.key
         if numbers.has_begun or key.fingerprint not in self.memory.on_disk.resumed:

@@ -340,6 +340,29 @@ def test_who_restarts_soon_after_its_numbers_were_lost_waits_until_its_age_has_c
         assert machine.sealing.halted == ""
 
 
+@pytest.mark.parametrize("is_mended", [True, False])
+def test_a_clock_that_was_set_back_makes_it_wait_until_it_is_right_or_not_trusted(is_mended):
+    machine = Machine()
+    machine.age_s = 10 * DAY_S
+    machine.lose([KEY], True, False, False)
+    machine.do("time", 0.0)
+    machine.do("time", 25.0)
+    machine.do("send", 10)
+    machine.restart([KEY])
+    machine.age_s -= 5 * DAY_S
+    machine.do("time", 600.0)
+    before = len(machine.used)
+    machine.do("send", 10)
+    assert len(machine.used) == before
+    assert "it seals again in" in machine.sealing.halted
+    machine.age_s += 5 * DAY_S * is_mended
+    machine.is_synchronized = is_mended
+    machine.do("time", 1.0)
+    machine.do("send", 10)
+    assert len(machine.used) == before + 10
+    assert machine.sealing.halted == ""
+
+
 def test_by_the_age_nobody_gets_into_the_last_quarter():
     machine, _ = asking()
     resuming = machine.sealing.opener.resuming
