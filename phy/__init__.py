@@ -15,7 +15,7 @@ from phy.error_rate import (
     pdu_error_rate,
     pdu_lost_rate,
 )
-from phy.expected import Expected
+from phy.expected import Expected, OtherLink
 from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
 from phy.layout import BurstLayout, layout, most_pdus
 from phy.mcs import MCS_TABLE, SLOWER_MCS, Mcs
@@ -66,6 +66,7 @@ __all__ = [
     "Mcs",
     "Modulation",
     "Numerology",
+    "OtherLink",
     "Path",
     "PathParams",
     "PduHeard",

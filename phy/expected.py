@@ -3,6 +3,13 @@
 from typing import NamedTuple
 
 
+class OtherLink(NamedTuple):
+    """What the headers of another link tell: its network, and the length of its PDUs in bytes."""
+
+    network: int
+    pdu_bytes: int
+
+
 class Expected(NamedTuple):
     """The PDU length and the longest burst of our network, and a budget for everything else.
 

@@ -39,7 +39,7 @@ from phy import compute, preamble
 from phy.acquisition import Missed, before, needed_after
 from phy.cuts import Cuts
 from phy.demodulation import Demodulator
-from phy.expected import Expected
+from phy.expected import Expected, OtherLink
 from phy.incoming import BACK, IncomingBurst, OnPoints, Place
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
@@ -133,6 +133,10 @@ class Receiver:
         """The air that the last header claims."""
         self.counters: Counter[str] = Counter()
         self._begin(start)
+
+    def others(self, n_samples: int) -> list[OtherLink]:
+        """Other links that were heard often in the last `n_samples`; safe on any thread."""
+        return self._screening.others(self._stream.end - n_samples)
 
     @property
     def next_index(self) -> int:
@@ -296,6 +300,7 @@ class Receiver:
         self._memory.content.heard(found.quality.noise)
         told = found.header
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
+        self._screening.note_other(told, found.quality.start)
         if self._screening.refuses(told, plan):
             self._screening.missed()
             self._pass_by(peak, "headers_refused")

@@ -1,9 +1,16 @@
 """Which preambles a receiver acquires, which headers it believes, and how much air they claim."""
 
-from phy.expected import Expected
+from collections import Counter, deque
+
+from phy.expected import Expected, OtherLink
 from phy.header import N_NETWORKS, BurstHeader
 from phy.layout import BurstLayout
 from phy.quality import BurstQuality, Claim
+
+MOST_OTHERS = 64
+"""Headers of other links that are remembered."""
+OFTEN = 3
+"""Headers after which another link is believed: a single one may be noise."""
 
 
 class Screening:
@@ -20,6 +27,7 @@ class Screening:
         self._expected = expected
         self._left = 0.0 if expected is None else float(expected.misses)
         self._at = start
+        self._others: deque[tuple[int, OtherLink]] = deque(maxlen=MOST_OTHERS)
 
     def allows(self, index: int) -> bool:
         """Whether the peak at `index` may be acquired, by the budget for acquisitions that fail."""
@@ -38,6 +46,17 @@ class Screening:
     def is_foreign(self, header: BurstHeader) -> bool:
         """Whether a header names another network than ours."""
         return self._network is not None and header.network != self._network
+
+    def note_other(self, header: BurstHeader, index: int) -> None:
+        """Remember a header at `index` that is of another network, or has another PDU length."""
+        expected = self._expected
+        if self.is_foreign(header) or (expected and header.pdu_bytes != expected.pdu_bytes):
+            self._others.append((index, OtherLink(header.network, header.pdu_bytes)))
+
+    def others(self, since: int) -> list[OtherLink]:
+        """Links other than ours that were heard often since index `since`, the most often first."""
+        heard = Counter(other for index, other in tuple(self._others) if index >= since)
+        return [other for other, n in heard.most_common() if n >= OFTEN]
 
     def refuses(self, header: BurstHeader, plan: BurstLayout) -> bool:
         """Whether no burst of our network can have this header, which announces `plan`."""

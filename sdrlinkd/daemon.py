@@ -24,6 +24,7 @@ from sdrlinkd.control import Control
 from sdrlinkd.declaring import Declaring
 from sdrlinkd.descriptors import Descriptors
 from sdrlinkd.errors import ConfigError, ungrouped
+from sdrlinkd.health import first_line
 from sdrlinkd.keeping import open_keeping
 from sdrlinkd.link import Link
 from sdrlinkd.modem import Loading, access_words, check_airtime, make_modem
@@ -264,7 +265,7 @@ async def _watch(notifier: Notifier, node: Node, control: Control) -> None:
 
 def status_line(snapshot: Snapshot) -> str:
     """The daemon's state in one line, for systemd and the log."""
-    verdict = ": ".join([snapshot.verdict.level, *snapshot.verdict.reasons[:1]])
+    verdict = first_line(snapshot.verdict)
     radio = f"{snapshot.carrier.kind} {snapshot.carrier.state}"
     return f"{verdict}; {radio}; {traffic_line(snapshot)}"
 

@@ -485,6 +485,15 @@ class LineReport(msgspec.Struct, frozen=True, kw_only=True):
     """Whether it moves through the band."""
 
 
+class OtherLinkReport(msgspec.Struct, frozen=True, kw_only=True):
+    """A link whose bursts are heard, but not received: it has another network or PDU size."""
+
+    network: int
+    """Its modem.network."""
+    pdu_size: int
+    """Its link.pdu_size, in bytes."""
+
+
 class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """The PDU link, which carries the PDUs, and its state."""
 
@@ -515,6 +524,10 @@ class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """What computes the modem, as text for people; empty: not known yet."""
     lines: list[LineReport] = []
     """Tones and narrow signals that are cut out of the received samples, the strongest first."""
+    network: int | None = None
+    """Our modem.network; null: there is no modem."""
+    others: list[OtherLinkReport] = []
+    """Other links that were heard in the last 10 s, the most often first."""
     notices: list[str] = []
     """What a person should know about the PDU link, in sentences."""
 
@@ -539,6 +552,8 @@ class VerdictReport(msgspec.Struct, frozen=True, kw_only=True):
 
     level: str = "OK"
     """The verdict: OK | DEGRADED | DOWN"""
+    protection: str = "in the clear"
+    """What protects the PDUs that we send: in the clear | authenticated | sealed"""
     reasons: list[str] = []
     """Why the level is not OK, the worst reason first."""
 

@@ -30,7 +30,7 @@ LOST_S = 10
 """As in the alert SdrlinkRobotLost."""
 
 VERDICTS: Words = {0: ("OK", GREEN), 1: ("DEGRADED", AMBER), 2: ("DOWN", RED)}
-SEALS: Words = {0: ("off", AMBER), 1: ("auth", GREEN), 2: ("seal", GREEN)}
+SEALS: Words = {0: ("in the clear", AMBER), 1: ("authenticated", GREEN), 2: ("sealed", GREEN)}
 PRESENCE: Words = {0: ("gone", RED), 1: ("up", GREEN)}
 GOOD_SNR: Steps = [(None, RED), (6.0, AMBER), (12.0, GREEN)]
 LITTLE_LOSS: Steps = [(None, GREEN), (0.05, AMBER), (0.2, RED)]

@@ -49,7 +49,9 @@ INFO = {
 """Texts that are labels of sdrlink_info."""
 RUNTIME_DIR = "runtime_dir"
 """Label of sdrlink_up, and of sdrlink_info: so a daemon that is gone still has the robot's id."""
-SKIPPED = ("node", "taken_at_unix_ns", "carrier.lines")
+SKIPPED = (
+    "node", "taken_at_unix_ns", "carrier.lines", "carrier.others", "verdict.protection",
+)  # fmt: skip
 """The first is a label of everything; Prometheus has a time of its own; a sweep would bring labels
 without end."""
 

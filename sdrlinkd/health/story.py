@@ -5,7 +5,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from sdrlinkd.health.lately import Lately, shed_by_topic
-from sdrlinkd.health.verdict import is_away, is_silent
+from sdrlinkd.health.verdict import is_away, is_silent, other_links
 from sdrlinkd.health.words import pdu_link_name, span
 from sdrlinkd.reports import NeighborReport, Snapshot, TopicReport
 
@@ -53,7 +53,8 @@ class Story:
         for robot in snapshot.link.neighbors:
             if not robot.is_self:
                 yield from self._robot(robot, snapshot)
-        yield from self._strangers(snapshot.link.security.strangers)
+        strangers = snapshot.link.security.strangers
+        yield from self._strangers([*strangers, *other_links(snapshot, lately)])
         yield from self._queue(snapshot, lately)
         yield from self._samples(snapshot, lately)
         yield from self._replacing(snapshot.link.topics)
@@ -105,6 +106,8 @@ class Story:
             )
         elif state == "ended":
             yield Line("radio", Level.INFO, f"the {name} has ended")
+        elif state == "down" and pdu_link.kind == "loopback":
+            yield Line("radio", Level.WARNING, "the loopback stands still: the CPU is too slow")
         elif self._was_up:
             yield Line("radio", Level.WARNING, f"the {name} is gone: {pdu_link.reason}")
         elif state == "down":

@@ -1,11 +1,12 @@
 """Words for people: the PDU link's name, time spans, shares."""
 
-from sdrlinkd.reports import LineReport, PduLinkReport
+from sdrlinkd.reports import LineReport, PduLinkReport, VerdictReport
 
 _NAMES = {
     "ether": "hub",
     "gnuradio": "flowgraph",
     "iqfile": "recording",
+    "loopback": "loopback",
     "zmq": "sample stream",
 }
 
@@ -13,6 +14,13 @@ _NAMES = {
 def pdu_link_name(pdu_link: PduLinkReport) -> str:
     """The word for the PDU link, for sentences on its absence."""
     return _NAMES.get(pdu_link.kind, "radio")
+
+
+def first_line(verdict: VerdictReport) -> str:
+    """The verdict in one line: level, protection, and the first of its reasons."""
+    more = f"; + {len(verdict.reasons) - 1} more" if len(verdict.reasons) > 1 else ""
+    told = ": ".join([f"{verdict.level}, {verdict.protection}", *verdict.reasons[:1]])
+    return told + more
 
 
 def span(seconds: float) -> str:

@@ -75,6 +75,8 @@ class ModemStatus(NamedTuple):
     """What to do about what the kernel refused, in a sentence; empty: nothing."""
     lines: Sequence[LineSeen] = ()
     """What is cut out of the received samples now, the strongest first."""
+    others: Sequence[phy.OtherLink] = ()
+    """Other links that were heard in the last 10 s, the most often first."""
 
 
 class ModemUser(Protocol):

@@ -4,7 +4,10 @@ import phy
 from backends import Capabilities
 from sdrlinkd.config import ModemParams
 from sdrlinkd.modem.modem import ModemStatus
-from sdrlinkd.reports import LineReport, PduLinkReport
+from sdrlinkd.reports import LineReport, OtherLinkReport, PduLinkReport
+
+NO_SAMPLES = "it delivers no samples"
+ON_ETHER = f"{NO_SAMPLES}: start it again if it has stopped, or end programs that take its CPU"
 
 
 def modem_report(
@@ -22,7 +25,9 @@ def modem_report(
     """
     reason = problem
     if state == "down" and not problem:
-        reason = modem.trouble or ("it delivers no samples" if stream_end else "")
+        reason = modem.trouble or (
+            (ON_ETHER if kind == "ether" else NO_SAMPLES) if stream_end else ""
+        )
     power_dbfs, ratio = modem.power_dbfs, modem.realtime_ratio
     return PduLinkReport(
         kind=kind,
@@ -46,6 +51,10 @@ def modem_report(
                 sweeps=line.moves,
             )
             for line in modem.lines
+        ],
+        network=params.network,
+        others=[
+            OtherLinkReport(network=each.network, pdu_size=each.pdu_bytes) for each in modem.others
         ],
         notices=_notices(state, problem, params, modem, can, stream_end),
     )

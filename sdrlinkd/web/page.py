@@ -6,6 +6,7 @@ from typing import Protocol
 from nicegui import ui
 from nicegui.events import KeyEventArguments
 
+from sdrlinkd.health import first_line
 from sdrlinkd.web.air_tab import AirTab
 from sdrlinkd.web.link_tab import LinkTab
 from sdrlinkd.web.map_tab import MapTab
@@ -113,7 +114,7 @@ def _verdict(station: Station | None, now: float) -> tuple[str, str]:
     if station.is_away(now):
         return "DOWN", f"no answer for {now - station.at:.0f} s"
     verdict = station.snapshot.verdict
-    return verdict.level, ": ".join([verdict.level, *verdict.reasons[:1]])
+    return verdict.level, first_line(verdict)
 
 
 def _key(event: KeyEventArguments, tabs: ui.tabs, head: _Head) -> None:

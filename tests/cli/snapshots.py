@@ -27,7 +27,7 @@ SNAPSHOT = Snapshot(
     taken_at_unix_ns=0,
     uptime_s=3725.0,
     loop_lag_ms=0.42,
-    verdict=VerdictReport(
+    verdict=VerdictReport(protection="sealed",
         level="DEGRADED",
         reasons=["robot 2 has a different registry", "robot 2 hears us at 3 dB, 4 % lost"],
     ),
@@ -173,7 +173,7 @@ def busy(at: int = 0) -> Snapshot:
     reasons = [f"robot {src} hears us at {3 * src} dB, {src} % lost" for src in range(2, 10)]
     return msgspec.structs.replace(
         SNAPSHOT, link=link, uptime_s=SNAPSHOT.uptime_s + at,
-        verdict=VerdictReport(level="DEGRADED", reasons=reasons),
+        verdict=VerdictReport(protection="sealed", level="DEGRADED", reasons=reasons),
         notices=[f"note number {i}" + ", which goes on for a while" * 4 for i in range(4)],
     )  # fmt: skip
 

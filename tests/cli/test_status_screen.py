@@ -7,7 +7,7 @@ import pytest
 
 from sdrlinkd.cli.screens import StatusScreen
 from sdrlinkd.cli.status import ledger_lines
-from sdrlinkd.reports import SecurityReport, VerdictReport
+from sdrlinkd.reports import VerdictReport
 from tests.cli.pictures import assert_stored, drawn
 from tests.cli.snapshots import LONG, SNAPSHOT, busy
 
@@ -75,14 +75,13 @@ def test_what_is_idle_takes_one_line():
      "DEGRADED, sealed: robot 2 hears us at 3 dB, 4 % lost; b"),
 ])  # fmt: skip
 def test_line_1_is_the_verdict(level, reasons, line):
-    told = VerdictReport(level=level, reasons=reasons)
+    told = VerdictReport(level=level, protection="sealed", reasons=reasons)
     text = screen(msgspec.structs.replace(SNAPSHOT, verdict=told))
     assert text.splitlines()[0] == line
 
 
 def test_line_1_says_that_nothing_is_sealed():
-    link = msgspec.structs.replace(SNAPSHOT.link, security=SecurityReport())
-    told = msgspec.structs.replace(SNAPSHOT, link=link, verdict=VerdictReport())
+    told = msgspec.structs.replace(SNAPSHOT, verdict=VerdictReport())
     assert screen(told).splitlines()[0] == "OK, in the clear"
 
 

@@ -31,8 +31,8 @@ SEALED = (
 IN_THE_CLEAR = (
     Fault("nothing, without a key", 1, "OK", ""),
     Fault("robot 2 has no key", 2, "DOWN", "robot 1 is heard, but seals its PDUs"),
-    Fault("robot 2 has another network id", 1, "DOWN", "robot 2 is heard, but in another"),
-    Fault("robot 2 has another PDU size", 1, "DOWN", "a robot is heard, but with another"),
+    Fault("robot 2 has another network id", 1, "DOWN", "a robot is heard, but in another network"),
+    Fault("robot 2 has another PDU size", 1, "DOWN", "a robot is heard, but with another PDU"),
     Fault("robot 2 has another registry", 1, "DEGRADED", "robot 2 has a different topic"),
     Fault("robot 2 is switched off", 1, "DEGRADED", "robot 2 not heard for"),
     Fault("robot 2 was never on", 1, "DEGRADED", "no robot heard yet"),

@@ -13,6 +13,7 @@ from phy.testing import preamble
 from tests.laws import law
 
 RATE = 1_000_000
+SEED = 7
 GRID = phy.OFDM_64_16
 SIZE, N_PDUS, MCS = 256, 2, 3
 # A header alone: preamble and header symbols.
@@ -187,3 +188,24 @@ def test_the_reference_refuses_the_same():
     assert heard(ours, x) == heard(other, x)
     assert ours.counters == other.counters
     assert ours.claim[:2] == other.claim[:2]
+
+
+@pytest.mark.parametrize(
+    ("size", "network", "told"),
+    [(SIZE, 3, [(3, SIZE)]), (SIZE + 32, 0, [(0, SIZE + 32)]), (SIZE, 0, [])],
+)
+def test_a_link_of_another_network_or_pdu_length_is_told_after_three_bursts(size, network, told):
+    rng = np.random.default_rng(SEED)
+    receiver = phy.Receiver(0, expected=EXPECTED)
+    for n in range(1, 4):
+        assert receiver.others(RATE) == []
+        x = noise(rng, 6000)
+        _, burst = a_burst(rng, size, 1, network=network)
+        x[1000 : 1000 + len(burst)] += burst
+        receiver.push(x)
+        assert (receiver.counters["bursts"] == n) == (not told)
+    assert receiver.others(RATE) == told
+    # It is forgotten once it has not been heard for as long as is asked.
+    receiver.push(noise(rng, 20_000))
+    assert receiver.others(20_000) == []
+    assert receiver.others(RATE) == told

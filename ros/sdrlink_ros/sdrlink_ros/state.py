@@ -58,9 +58,10 @@ def diagnosis(robot: int, snapshot: "Mapping[str, Any] | None") -> DiagnosticSta
         return status
     verdict, link = snapshot["verdict"], snapshot["link"]
     status.level = LEVELS.get(verdict["level"], DiagnosticStatus.WARN)
-    status.message = "; ".join(verdict["reasons"]) or "OK"
+    status.message = "; ".join(verdict["reasons"]) or f"OK, {verdict['protection']}"
     tx, rx = link["tx"], link["rx"]
     values = {
+        "protection": verdict["protection"],
         "radio": f"{snapshot['carrier']['kind']} {snapshot['carrier']['state']}",
         "messages sent": tx["sent"],
         "messages queued": tx["queued"],

@@ -66,7 +66,7 @@ class _Block:
 def verdict(snapshot: Snapshot, width: int, *, whole: bool = False) -> Text:
     """The verdict's level, and as many of its reasons as two lines hold, or all if `whole`."""
     level, reasons = snapshot.verdict.level, snapshot.verdict.reasons
-    told = f"{level}, {'in the clear' if snapshot.link.security.mode == 'off' else 'sealed'}"
+    told = f"{level}, {snapshot.verdict.protection}"
     room = REASON_LINES * width - len("; + 99 more reasons: --all")
     for at, reason in enumerate(reasons):
         longer = f"{told}{'; ' if at else ': '}{reason}"
@@ -79,8 +79,11 @@ def verdict(snapshot: Snapshot, width: int, *, whole: bool = False) -> Text:
     return text
 
 
-def head(snapshot: Snapshot, width: int) -> list[Text]:
-    """The lines below the verdict: robot, radio, channel, and the two ledgers."""
+def head(snapshot: Snapshot, width: int, *, whole: bool = False) -> list[Text]:
+    """The lines below the verdict: robot, radio, channel, and the two ledgers.
+
+    Unless `whole`, the settings of a radio that is up are left out.
+    """
     pdu_link, link = snapshot.carrier, snapshot.link
     named = f" ({snapshot.namespace})" if snapshot.namespace else ""
     lag = f", loop lag {snapshot.loop_lag_ms:.1f} ms"
@@ -88,7 +91,8 @@ def head(snapshot: Snapshot, width: int) -> list[Text]:
     radio = f"{pdu_link.kind} {pdu_link.state}"
     if pdu_link.state != "up" and pdu_link.since_s:
         radio += f" since {duration(pdu_link.since_s)}"
-    radio += f" ({pdu_link.detail})" if pdu_link.detail else ""
+    if pdu_link.detail and (whole or pdu_link.state != "up"):
+        radio += f" ({pdu_link.detail})"
     if pdu_link.level_dbfs is not None:
         radio += (
             f"; level {decibels(pdu_link.level_dbfs)} dBFS, clipped {pdu_link.clipped_pct:.2f} %"
@@ -123,7 +127,10 @@ def head(snapshot: Snapshot, width: int) -> list[Text]:
 def everything(snapshot: Snapshot, width: int) -> list[RenderableType]:
     """The screen of `--all`: every topic, robot and reason."""
     link = snapshot.link
-    parts: list[RenderableType] = [verdict(snapshot, width, whole=True), *head(snapshot, width)]
+    parts: list[RenderableType] = [
+        verdict(snapshot, width, whole=True),
+        *head(snapshot, width, whole=True),
+    ]
     counters = dict(snapshot.carrier.counters)
     air_ms = counters.pop("air_cpu_ms", 0)
     counted = ", ".join(f"{key} {n}" for key, n in counters.items() if n)

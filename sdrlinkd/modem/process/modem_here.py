@@ -30,6 +30,8 @@ from sdrlinkd.pdulink import Heard, Observe
 
 MISSES_PER_S = 1000
 """Acquisitions a second that may bring nothing: a tenth of a core."""
+OTHERS_S = 10.0
+"""Time in s for which a link of another network or PDU length is told."""
 
 
 async def forever() -> NoReturn:
@@ -120,6 +122,7 @@ class ModemHere:
             counters,
             0.0 if self._rx is None else self._rx.load.realtime_ratio,
             lines=[] if self._receiving is None else self._receiving.lines,
+            others=self._others(),
         )
 
     @property
@@ -203,6 +206,12 @@ class ModemHere:
             self._rx.stop()
         if self._tx is not None:
             self._tx.close()
+
+    def _others(self) -> list[phy.OtherLink]:
+        """Other links that were heard lately."""
+        if self._receiver is None:
+            return []
+        return self._receiver.others(round(OTHERS_S * self._params.rate_hz))
 
     def _expected(self) -> phy.Expected:
         """What the headers of this link may tell, and how many others are followed a second."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import msgspec
 
+import phy
 from backends import AbsentError, BackendError, Patience, RefusalError
 from sdrlinkd.link import Outcome
 from sdrlinkd.modem.modem import BurstOrder, ModemStatus
@@ -137,6 +138,7 @@ class Status(msgspec.Struct, frozen=True, array_like=True, tag="status"):
     engine: str
     advice: str
     lines: list[LineSeen]
+    others: list[phy.OtherLink]
 
 
 class Observed(msgspec.Struct, frozen=True, array_like=True, tag="observed"):
@@ -171,6 +173,7 @@ def status_of(status: ModemStatus) -> Status:
         status.engine,
         status.advice,
         list(status.lines),
+        list(status.others),
     )
 
 

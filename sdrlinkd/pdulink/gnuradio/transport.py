@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import errno
+import os
 import socket
 from collections.abc import Callable
 from typing import Protocol, cast
@@ -144,10 +146,11 @@ class UdpTransport(asyncio.DatagramProtocol):
                 remote_addr=None if self._own else self._peer,
             )
         except OSError as error:
-            raise UserError(
-                f"gnuradio.{'receive' if self._own else 'send'}: {self._own or self._peer}: cannot "
-                f"be opened ({error.strerror})"
-            ) from None
+            key, (host, port) = ("receive", self._own) if self._own else ("send", self._peer)
+            why = os.strerror(error.errno) if error.errno else str(error)
+            if error.errno == errno.EADDRINUSE:
+                why = "another program uses this port; is a second daemon running?"
+            raise UserError(f"gnuradio.{key}: {host}:{port}: cannot be opened ({why})") from None
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         """Take a datagram of the flowgraph's host, which holds one PDU."""
