@@ -1,5 +1,6 @@
 """Where a hub is: in a folder of this computer, or at a port of another one."""
 
+import re
 import socket
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +13,7 @@ PATIENCE_S = 2.0
 """Longest wait for another computer to accept a connection."""
 MAX_PORT = 65534
 """The hub's second socket has the next port."""
+_HOST = re.compile(r"[^\s/]+")
 
 
 class HubAddress(NamedTuple):
@@ -39,7 +41,7 @@ def hub_in(directory: Path) -> HubAddress:
 def hub_at(text: str, key: str) -> HubAddress:
     """The hub at `text`, HOST:PORT. Raises BackendError that cites `key`."""
     host, _, port = text.rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) <= MAX_PORT:
+    if not _HOST.fullmatch(host) or not port.isdecimal() or not 0 < int(port) <= MAX_PORT:
         raise BackendError(
             f'{key}: got "{text}"; allowed: HOST:PORT with a port from 1 to {MAX_PORT}, such as '
             "192.168.1.5:47900"

@@ -91,10 +91,11 @@ def _read(path: Path) -> "Setup":
 
 def _checked(setup: "Setup") -> list[str]:
     """The lines that `--check` prints about the configuration and the radio. Raises UserError."""
-    from sdrlinkd import daemon
+    from sdrlinkd import daemon, starting
     from sdrlinkd.config import unchecked
 
     told = daemon.check(setup)
+    told += starting.try_start(setup, daemon.runtime_directory(setup.config))
     verdict = (
         "the file is valid; the daemon checks the rest when it starts"
         if unchecked(setup.config)
@@ -116,7 +117,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--check",
         action="store_true",
-        help="check the configuration, print what follows from it, and exit",
+        help="check whether the daemon would start with it, print what follows, and exit",
     )
     parser.add_argument(
         "--log-level", choices=("debug", "info", "warning", "error"), default="info"

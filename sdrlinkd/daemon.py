@@ -99,7 +99,7 @@ async def _open(
 ) -> tuple[Node, Control, Reloading, Descriptors]:  # fmt: skip
     config = setup.config
     rng = Random(os.urandom(16) if config.seed is None else config.seed)
-    directory = RuntimeDirectory(_runtime_directory(config))
+    directory = RuntimeDirectory(runtime_directory(config))
     stack.callback(directory.close)
     keeping = open_keeping(setup)
     if keeping is not None:
@@ -240,7 +240,8 @@ def _own_traffic(setup: Setup, stack: contextlib.AsyncExitStack) -> Iterator["Du
     return due_messages(recording, play.duration_s, play.begin_s, setup.topics_in)
 
 
-def _runtime_directory(config: Config) -> Path:
+def runtime_directory(config: Config) -> Path:
+    """The directory of the daemon's sockets: configured, or systemd's, or the user's."""
     # systemd's RuntimeDirectory= may name several; the first one is ours.
     given = config.bus.runtime_dir or os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
     return runtime_dir(given or None)

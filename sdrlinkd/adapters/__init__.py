@@ -5,7 +5,7 @@ from sdrlinkd.adapters.chrony import ChronySocket
 from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.fields import cdr_from_fields, check_cdr
 from sdrlinkd.adapters.mcap_file import McapFile, Recorded
-from sdrlinkd.adapters.message_types import MessageTypes
+from sdrlinkd.adapters.message_types import MessageTypes, unknown_types
 from sdrlinkd.adapters.pacing import first_seconds, from_second, paced
 from sdrlinkd.adapters.places import PLACES, SHARED_FRAMES, Fix, Place, read_place
 from sdrlinkd.adapters.recorder import BagWriter
@@ -47,4 +47,5 @@ __all__ = [
     "summarise",
     "to_cdr",
     "type_hash",
+    "unknown_types",
 ]

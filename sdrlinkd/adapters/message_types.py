@@ -1,6 +1,7 @@
 """What the daemon must know of message types: stop messages, and which begin with a header."""
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 
 from sdrlinkd.adapters.fields import cdr_from_fields
 from sdrlinkd.adapters.stops import begins_with_header, stop_messages
@@ -11,6 +12,20 @@ from sdrlinkd.link import HeardTopic
 
 MOST_TYPES = 1000
 """Types to be remembered, as their names come from the air."""
+
+
+def unknown_types(setup: Setup) -> list[str]:
+    """A warning for each topic whose type is not in its package, although the package is known."""
+    names = ros2_types().fielddefs.keys()
+    packages = {name.split("/")[0] for name in names}
+    found = []
+    for topic in setup.registry.topics:
+        if topic.type in names or topic.type.split("/")[0] not in packages:
+            continue
+        close = get_close_matches(topic.type, names, n=1)
+        meant = f"; did you mean {close[0]}?" if close else ""
+        found.append(f"{topic.name}: the type {topic.type} is unknown{meant}")
+    return found
 
 
 class MessageTypes:

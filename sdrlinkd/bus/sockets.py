@@ -11,6 +11,7 @@ import zmq
 
 from sdrlinkd.client import endpoint
 from sdrlinkd.errors import BusError
+from sdrlinkd.files import unwritable
 
 LOCK_NAME = "lock"
 # A Unix socket's path has at most 107 bytes, including the longest of our socket names.
@@ -25,25 +26,18 @@ class RuntimeDirectory:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        if len(os.fsencode(path)) > MAX_DIRECTORY_BYTES:
-            raise BusError(
-                f"bus.runtime_dir: {path} has {len(os.fsencode(path))} bytes; a socket path "
-                f"allows {MAX_DIRECTORY_BYTES}"
-            )
+        _refuse_long(path)
         try:
             path.mkdir(mode=0o750, parents=True, exist_ok=True)
             _refuse_foreign(path)
             flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
             self._lock = os.open(path / LOCK_NAME, flags, 0o640)
         except OSError as error:
-            raise BusError(
-                f"bus.runtime_dir: {path} is unusable ({error.strerror}); name a directory "
-                "that this user may write to"
-            ) from None
+            raise _unusable(path, error.strerror) from None
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            owner = os.read(self._lock, 32).decode(errors="replace").strip() or "unknown"
+            owner = _owner(self._lock)
             os.close(self._lock)
             raise BusError(
                 f"another sdrlinkd (pid {owner}) already runs in {path}; stop it, or give this "
@@ -101,6 +95,50 @@ class RuntimeDirectory:
             path.unlink(missing_ok=True)
         os.ftruncate(self._lock, 0)
         os.close(self._lock)
+
+
+def check_directory(path: Path) -> None:
+    """Check that a daemon of this user can make its sockets in `path`. Raises BusError."""
+    _refuse_long(path)
+    if problem := unwritable(path):
+        raise _unusable(path, problem)
+    if path.exists():
+        _refuse_foreign(path)
+
+
+def running_in(path: Path) -> str:
+    """The process id of the daemon whose sockets are in `path`; empty if there is none."""
+    try:
+        lock = os.open(path / LOCK_NAME, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+    except OSError:
+        return ""
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return _owner(lock)
+    finally:
+        os.close(lock)
+    return ""
+
+
+def _owner(lock: int) -> str:
+    return os.pread(lock, 32, 0).decode(errors="replace").strip() or "unknown"
+
+
+def _unusable(path: Path, problem: str | None) -> BusError:
+    return BusError(
+        f"bus.runtime_dir: {path} is unusable ({problem}); name a directory that this user may "
+        "write to"
+    )
+
+
+def _refuse_long(path: Path) -> None:
+    length = len(os.fsencode(path))
+    if length > MAX_DIRECTORY_BYTES:
+        raise BusError(
+            f"bus.runtime_dir: {path} has {length} bytes; a socket path allows "
+            f"{MAX_DIRECTORY_BYTES}"
+        )
 
 
 def is_foreign(about: os.stat_result, uid: int) -> bool:

@@ -20,19 +20,23 @@ from sdrlinkd.link import TopicPolicy
 
 S = TypeVar("S", bound=msgspec.Struct)
 
+_PLACE = re.compile(r" \(at (?:line (\d+)(, column \d+)|end of document)\)")
+_CURLY = re.compile("[\u2018-\u201f\u00ab\u00bb]")
+_YAML = re.compile(r"\s*([\w.-]+):(\s|$)")
 _AT = re.compile(r" - at `\$\.?(.*)`$")
 
 
 def load_config(path: Path) -> Config:
     """The configuration in `path`. Raises ConfigError."""
     try:
-        text = read_bounded(path).decode()
+        # An editor may have put a byte order mark before the text.
+        text = read_bounded(path).decode("utf-8-sig")
     except OSError as error:
         raise ConfigError(
             f"{path}: cannot be read ({error.strerror}); name a configuration with --config FILE"
         ) from None
     except UnicodeDecodeError:
-        raise ConfigError(f"{path}: is not a text file") from None
+        raise ConfigError(f"{path}: is not a text in UTF-8; save it as one") from None
     return parse_config(text, str(path))
 
 
@@ -56,7 +60,27 @@ def _read(text: str, source: str) -> dict[str, object]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{source}: not TOML: {error}") from None
+        raise ConfigError(_not_toml(text, source, str(error))) from None
+
+
+def _not_toml(text: str, source: str, problem: str) -> str:
+    """What is wrong with a text that is not TOML, where, and what may have been meant."""
+    found, lines = _PLACE.search(problem), text.splitlines()
+    number = int(found[1]) if found and found[1] else len(lines)
+    at = f":{number}" if found else ""
+    line = lines[number - 1] if found and 0 < number <= len(lines) else ""
+    if text.lstrip().startswith("{"):
+        hint = 'this looks like JSON; write TOML, such as namespace = "robot_1"'
+    elif curly := _CURLY.search(line):
+        hint = f'{curly[0]} is a typographic quote; write "'
+    elif yaml := _YAML.match(line):
+        hint = f'this looks like YAML; write {yaml[1]} = …, with texts in "…"'
+    elif problem.startswith("Invalid value"):
+        hint = 'texts stand in quotes, as in namespace = "robot_1"'
+    else:
+        hint = ""
+    told = _PLACE.sub(lambda place: place[2] or "", problem)
+    return f"{source}{at}: not TOML: {told}" + (f"; {hint}" if hint else "")
 
 
 def _typed(raw: dict[str, object], text: str, source: str, kind: type[S]) -> S:

@@ -11,6 +11,8 @@ from sdrlinkd.config.backends import backend_of
 from sdrlinkd.config.schema import WITHOUT_AIR, Config
 from sdrlinkd.errors import ConfigError
 
+LEAST_HZ = 1e4
+"""Below, no radio tunes; whoever gives less has left out the unit."""
 S = TypeVar("S", bound=msgspec.Struct)
 
 
@@ -29,6 +31,12 @@ def check_pdu_link(config: Config) -> None:
         raise ConfigError(
             f"modem.max_cfo_hz: got {modem.searched_cfo_hz:g}; allowed: at most a "
             f'quarter of modem.rate_hz, {modem.most_cfo_hz:g}, or "auto"'
+        )
+    if 0 < modem.frequency_hz < LEAST_HZ:
+        meant = f'; write "{modem.frequency_hz:g} MHz"?' if modem.frequency_hz >= 1 else ""
+        raise ConfigError(
+            f"modem.frequency_hz: got {modem.frequency_hz:g} Hz; allowed: 0 (not set), or at least "
+            f"{LEAST_HZ / 1e3:g} kHz{meant}"
         )
     radio = backend_of(config)
     problem = radio.problem(config.backend_settings, config.radio_needs) if radio else ""

@@ -1,6 +1,7 @@
 """Resolves a configuration into what the parts are built with, and finds every contradiction."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -42,6 +43,8 @@ from sdrlinkd.wire import (
 )
 
 MIN_BEACON_S = 0.01
+LONG_S = 60.0
+"""Lifespan in s above which messages of an urgent class are hardly meant to live."""
 _NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _RX_NAME = re.compile(r"(/[A-Za-z_]\w*)+/?", re.ASCII)
 _PLACEHOLDER = re.compile(r"\{(src_id|src)\}")
@@ -219,7 +222,11 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
         has_numbers=has_numbers,
         dictionaries=load_dictionaries(configured, registry, base),
         transforms=_transforms(config, registry, has_numbers),
-        warnings=_warnings(config, registry),
+        warnings=[
+            *_warnings(config, registry),
+            *_name_warnings(config, node_id),
+            *_lifespan_warnings(named),
+        ],
         topic_warnings={} if has_numbers else _topic_warnings(config, registry),
         source=source,
     )
@@ -283,6 +290,28 @@ def _warnings(config: Config, registry: Registry) -> list[str]:
     )
     deaf = "" if config.backend in WITHOUT_AIR else cfo_warning(config.modem)
     return [deaf] * bool(deaf) + [lonely] * (least > shared) + [full] * (not registry.has_control)
+
+
+def _name_warnings(config: Config, node_id: int) -> list[str]:
+    """A warning if the namespace is written otherwise than others will see this robot."""
+    own = config.namespace.strip("/")
+    digits = own.rsplit("_", 1)[-1]
+    if config.robot_id >= 0 or not digits.isdecimal() or digits == str(node_id):
+        return []
+    seen = f"{own[: -len(digits)]}{node_id}"
+    return [f"namespace {own}: others see this robot as robot {node_id}; write {seen}"]
+
+
+def _lifespan_warnings(named: Mapping[str, TopicPolicy]) -> list[str]:
+    """A warning for each urgent topic whose messages may be a minute old, or older."""
+    return [
+        f"topic.{name}.lifespan_s: {policy.lifespan_s:g} s lets {policy.qos} messages arrive when "
+        f'they are minutes old; for milliseconds, write "{policy.lifespan_s:g} ms"'
+        for name, policy in named.items()
+        if policy.qos in ("urgent", "latency")
+        and policy.lifespan_s is not None
+        and policy.lifespan_s > LONG_S
+    ]
 
 
 def _topic_warnings(config: Config, registry: Registry) -> dict[int, str]:

@@ -18,10 +18,11 @@ from sdrlinkd.keyring.files import (
     write_key_file,
 )
 from sdrlinkd.keyring.making import new_key
-from sdrlinkd.keyring.state import KeyState, machine_tag, state_dir
+from sdrlinkd.keyring.state import SYSTEM_CONFIG, KeyState, machine_tag, state_dir
 
 __all__ = [
     "CREDENTIAL",
+    "SYSTEM_CONFIG",
     "KeyFile",
     "KeyState",
     "StoredKey",

@@ -64,20 +64,41 @@ class KeyState:
 
     def hold(self) -> Self:
         """Keep other processes out until `close`. Raises UserError."""
-        path = self.directory / f"robot-{self._robot_id}.lock"
         try:
-            self._lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+            self._lock = os.open(
+                self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600
+            )
         except OSError as error:
             raise UserError(self._unusable(error)) from None
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             self.close()
-            raise UserError(
-                f"{self.directory}: another daemon seals as robot {self._robot_id} with this "
-                "directory; allowed: one"
-            ) from None
+            raise UserError(self.held) from None
         return self
+
+    @property
+    def held(self) -> str:
+        """What to say if another process holds it."""
+        return (
+            f"{self.directory}: another daemon seals as robot {self._robot_id} with this "
+            "directory; allowed: one"
+        )
+
+    @property
+    def is_held(self) -> bool:
+        """Whether another process holds it."""
+        try:
+            lock = os.open(self._lock_path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+        except OSError:
+            return False
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return True
+        finally:
+            os.close(lock)
+        return False
 
     def close(self) -> None:
         """Let other processes in."""
@@ -174,6 +195,10 @@ class KeyState:
                 state = self._read_at(path)
                 found |= state.newest.keys() if state is not None else set()
         return frozenset(found)
+
+    @property
+    def _lock_path(self) -> Path:
+        return self.directory / f"robot-{self._robot_id}.lock"
 
     def _unusable(self, error: OSError) -> str:
         return (

@@ -11,7 +11,13 @@ from sdrlinkd.pdulink.base import (
     PduListener,
 )
 from sdrlinkd.pdulink.direct import DirectLink
-from sdrlinkd.pdulink.gnuradio import GnuRadioLink, from_gnu_radio, make_gnuradio, to_gnu_radio
+from sdrlinkd.pdulink.gnuradio import (
+    GnuRadioLink,
+    from_gnu_radio,
+    make_gnuradio,
+    to_gnu_radio,
+    try_gnuradio,
+)
 from sdrlinkd.pdulink.impairment import Arrival, Impairment
 
 __all__ = [
@@ -30,4 +36,5 @@ __all__ = [
     "from_gnu_radio",
     "make_gnuradio",
     "to_gnu_radio",
+    "try_gnuradio",
 ]

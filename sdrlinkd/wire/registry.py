@@ -140,7 +140,7 @@ def parse_registry(text: str, source: str = "registry") -> Registry:
         if len(fields) != 2:
             raise RegistryError(
                 f"{source}:{number}: got {raw.strip()!r}; a line is `name,type`, "
-                "for example `odom,nav_msgs/Odometry`"
+                "for example `odom,nav_msgs/msg/Odometry`"
             )
         pairs.append((fields[0], fields[1], f"{source}:{number}"))
     return _assemble(pairs, source)

@@ -286,7 +286,7 @@ def test_a_missing_or_binary_file_is_a_user_error(tmp_path):
     with pytest.raises(UserError, match="--config"):
         load_config(tmp_path / "none.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(UserError, match="not a text file"):
+    with pytest.raises(UserError, match="not a text in UTF-8"):
         load_config(tmp_path / "binary.toml")
 
 

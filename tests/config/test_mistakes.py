@@ -1,18 +1,24 @@
 """Common mistakes in a configuration: each yields one line that says where and what."""
 
+import os
 import re
+import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from msgspec import inspect
 
 from sdrlinkd.__main__ import main
+from sdrlinkd.bus import RuntimeDirectory
 from sdrlinkd.config import Config
 
 ETC = Path(__file__).parents[2] / "etc"
 
 LOOPBACK = 'backend = "loopback"\n'
 SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=uhd"\n'
+UDP = 'backend = "gnuradio"\n[gnuradio]\ntransport = "udp"\n'
 ON_AIR = "[modem]\nfrequency_hz = 4e8\n"
 
 
@@ -119,8 +125,20 @@ MISTAKES = [
     ("[direct]\nloss = 1.5", 2, ["direct.loss: got 1.5", "from 0 to 1"]),
     ("drain_s = true", 1, ["drain_s: got true", "a number"]),
     ("[[link]]\npdu_size = 64", 1, ["link: got", "a table"]),
-    ("nonsense", 0, ["not TOML"]),
+    ("nonsense", 1, ["not TOML"]),
+    ("seed = 1\nnamespace = robot_1", 2, ["not TOML: Invalid value, column 13", "in quotes"]),
+    ("namespace = \u201crobot_1\u201d", 1, ["not TOML", "\u201c is a typographic quote"]),
+    ("namespace: robot_1", 1, ["not TOML", "looks like YAML; write namespace = …"]),
+    ('{"namespace": "robot_1"}', 1, ["not TOML", "looks like JSON"]),
     ("a = " + "[" * 3000, 0, ["not TOML"]),
+    (f"{SOAPY}[modem]\nfrequency_hz = 433.92", 5, ["got 433.92 Hz", 'write "433.92 MHz"?']),
+    ('backend = "ether"\n[ether]\nhub = "tcp://192.168.1.5:47900"', 3, ["HOST:PORT"]),
+    ('backend = "ether"\n[ether]\nhub = "192.168.1.5"', 3, ["HOST:PORT"]),
+    # What is tried besides, as a check that has passed means that the daemon starts.
+    (f'{LOOPBACK}[security]\nmode = "seal"\nkeys = "none.toml"', 4, ["none.toml"]),
+    ('[bus]\nruntime_dir = "/dev/null"', 2, ["/dev/null is not a directory"]),
+    ('backend = "iqfile"\n[iqfile]\nreceive = "none.sigmf-meta"', 3, ["no such recording"]),
+    ('[play]\nduration_s = 5\nbag = "none.mcap"', 3, ["none.mcap"]),
     ('registry = "a\\u0000b"', 0, ["registry is unreadable"]),
     ('[bus]\nruntime_dir = "a\\u0000b"', 2, ["bus.runtime_dir", "NUL"]),
 ]  # fmt: skip
@@ -152,6 +170,59 @@ def test_a_mistake_is_told_in_one_line_with_its_place(check, text, line, parts):
         assert part in err
 
 
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ('[security]\nmode = "seal"\nkeys = "none.toml"', "none.toml"),
+        ('[bus]\nruntime_dir = "/dev/null"', "/dev/null"),
+        ('[play]\nduration_s = 5\nbag = "none.mcap"', "none.mcap"),
+        (f'{UDP}send = "127.0.0.1:9"\nreceive = "127.0.0.1:{{taken}}"', "another program uses"),
+    ],
+)
+def test_what_the_check_refuses_does_not_start_either(check, tmp_path, text, part):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        code, _, err = check(text.replace("{taken}", str(taken.getsockname()[1])))
+        assert (code, part in err) == (2, True), err
+        started = subprocess.run(
+            [sys.executable, "-m", "sdrlinkd", "--config", str(tmp_path / "m.toml")],
+            env=os.environ | {"SDRLINKD_RUNTIME_DIR": str(tmp_path / "run")},
+            capture_output=True, text=True, check=False, timeout=60,
+        )  # fmt: skip
+    assert (started.returncode, part in started.stderr) == (2, True), started.stderr
+
+
+def test_a_check_beside_a_running_daemon_passes_and_leaves_no_trace(check, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    directory = tmp_path / "run"
+    text = f'[bus]\nruntime_dir = "{directory}"'
+    assert check(text)[0] == 0
+    assert not directory.exists()
+    running = RuntimeDirectory(directory)
+    code, out, _ = check(text)
+    running.close()
+    assert code == 0
+    assert f"a daemon runs in {directory}, process {os.getpid()}" in out
+
+
+@pytest.mark.parametrize(
+    ("text", "warning"),
+    [
+        ('namespace = "robot_01"', "write robot_1"),
+        ('[topic.cmd_vel]\nqos = "urgent"\nlifespan_s = 300', 'write "300 ms"'),
+        ("", "odometer: the type nav_msgs/msg/Odometri is unknown; did you mean nav_msgs/msg/Odom"),
+    ],
+)
+def test_what_is_allowed_but_hardly_meant_is_warned_of(check, tmp_path, text, warning):
+    with (tmp_path / "registry.csv").open("a") as file:
+        file.write("odometer,nav_msgs/msg/Odometri\nmine,my_robot/msg/State\n")
+    code, out, _ = check(text)
+    assert code == 0
+    warnings = [line for line in out.splitlines() if line.startswith("warning: ")]
+    assert any(warning in line for line in warnings), out
+    assert not any("my_robot" in line for line in warnings)
+
+
 def test_there_are_forty_and_more():
     assert len(MISTAKES) >= 40
 
@@ -164,9 +235,15 @@ def test_there_are_forty_and_more():
             ["not checked: whether", "frequency, rate, gains", "doctor", '"tdma" fits'],
         ),
         ('backend = "ether"\n[ether]\ndir = "air"', ["not checked: whether a hub answers"]),
-        ('backend = "iqfile"\n[iqfile]\nreceive = "x"', ["not checked: whether", "is readable"]),
+        (
+            'backend = "iqfile"\n[iqfile]\nreceive = "registry.csv"',
+            ["not checked: whether", "is readable"],
+        ),
         ('backend = "zmq"\n[zmq]\nsend = "@a"\nreceive = "b"', ["not checked: whether the flowg"]),
-        ('backend = "gnuradio"\n[gnuradio]\nsend = "a"\nreceive = "b"', ["flowgraph answers"]),
+        (
+            'backend = "gnuradio"\n[gnuradio]\ntransport = "udp"\nsend = "127.0.0.1:9"',
+            ["flowgraph answers"],
+        ),
     ],
 )
 def test_what_only_the_radio_can_tell_is_named(check, text, parts):

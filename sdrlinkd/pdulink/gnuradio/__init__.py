@@ -8,15 +8,28 @@ from sdrlinkd.pdulink.gnuradio.transport import TcpTransport, Transport, UdpTran
 
 def make_gnuradio(config: Config) -> GnuRadioLink:
     """The GNU Radio link that the configuration describes. Raises UserError."""
-    params, pdu_size = config.gnuradio, config.link.pdu_size
-    transport: Transport
+    return GnuRadioLink(config.gnuradio, config.link.pdu_size, _transport(config))
+
+
+async def try_gnuradio(config: Config) -> None:
+    """Open the sockets of the link that the configuration describes, and close them.
+
+    Raises UserError.
+    """
+    transport = _transport(config)
+    try:
+        await transport.open(lambda _: None)
+    finally:
+        transport.close()
+
+
+def _transport(config: Config) -> Transport:
+    params = config.gnuradio
     if params.transport == "udp":
-        transport = UdpTransport(params.send, params.receive)
-    elif params.transport == "tcp":
-        transport = TcpTransport(params.send, pdu_size)
-    else:
-        transport = ZmqTransport(params.send, params.receive, params.transport == "zmq-pub")
-    return GnuRadioLink(params, pdu_size, transport)
+        return UdpTransport(params.send, params.receive)
+    if params.transport == "tcp":
+        return TcpTransport(params.send, config.link.pdu_size)
+    return ZmqTransport(params.send, params.receive, params.transport == "zmq-pub")
 
 
-__all__ = ["GnuRadioLink", "from_gnu_radio", "make_gnuradio", "to_gnu_radio"]
+__all__ = ["GnuRadioLink", "from_gnu_radio", "make_gnuradio", "to_gnu_radio", "try_gnuradio"]

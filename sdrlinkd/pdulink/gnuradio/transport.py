@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import errno
-import os
 import socket
 from collections.abc import Callable
 from typing import Protocol, cast
@@ -139,18 +138,32 @@ class UdpTransport(asyncio.DatagramProtocol):
             if self._own is not None:
                 found = await loop.getaddrinfo(*self._peer, type=socket.SOCK_DGRAM)
                 self._hosts = {str(address[0]) for *_, address in found}
-            self._socket, _ = await loop.create_datagram_endpoint(
-                lambda: self,
-                local_addr=self._own,
-                # Connected, so that the kernel lets only the peer's datagrams in.
-                remote_addr=None if self._own else self._peer,
-            )
+            where = await loop.getaddrinfo(*(self._own or self._peer), type=socket.SOCK_DGRAM)
+            opened = self._open(*where[0])
+            self._socket, _ = await loop.create_datagram_endpoint(lambda: self, sock=opened)
         except OSError as error:
             key, (host, port) = ("receive", self._own) if self._own else ("send", self._peer)
-            why = os.strerror(error.errno) if error.errno else str(error)
+            why = error.strerror
             if error.errno == errno.EADDRINUSE:
                 why = "another program uses this port; is a second daemon running?"
             raise UserError(f"gnuradio.{key}: {host}:{port}: cannot be opened ({why})") from None
+
+    def _open(
+        self, family: int, kind: int, number: int, _: str, address: tuple[str, int]
+    ) -> socket.socket:
+        """A socket at `address`, which is ours or the peer's. Raises OSError."""
+        opened = socket.socket(family, kind, number)
+        try:
+            opened.setblocking(False)
+            if self._own is not None:
+                opened.bind(address)
+            else:
+                # So that the kernel lets only the peer's datagrams in.
+                opened.connect(address)
+        except OSError:
+            opened.close()
+            raise
+        return opened
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         """Take a datagram of the flowgraph's host, which holds one PDU."""
