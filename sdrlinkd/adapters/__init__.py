@@ -1,6 +1,6 @@
 """Adapters to the outside: recordings, message types, chronyd, and a robot for demonstrations."""
 
-from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
+from sdrlinkd.adapters.bags import Bag, BagMessage, BagQos, BagTopic, open_bag
 from sdrlinkd.adapters.chrony import ChronySocket
 from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.fields import cdr_from_fields, check_cdr
@@ -19,6 +19,7 @@ __all__ = [
     "SHARED_FRAMES",
     "Bag",
     "BagMessage",
+    "BagQos",
     "BagSummary",
     "BagTopic",
     "BagWriter",

@@ -24,17 +24,20 @@ class BagSummary(NamedTuple):
     n_messages: int
     n_bytes: int
     topics: list[TopicSummary]
+    pause_s: float
+    """The longest time without a message."""
 
 
 class _Seen:
     """Number, sizes and times of a topic's messages read so far."""
 
     def __init__(self) -> None:
-        self.n = self.n_bytes = self.max_bytes = self.first_ns = self.last_ns = 0
+        self.n = self.n_bytes = self.max_bytes = self.first_ns = self.last_ns = self.pause_ns = 0
 
     def add(self, time_ns: int, size: int) -> None:
         if not self.n:
-            self.first_ns = time_ns
+            self.first_ns = self.last_ns = time_ns
+        self.pause_ns = max(self.pause_ns, time_ns - self.last_ns)
         self.n, self.last_ns = self.n + 1, time_ns
         self.n_bytes, self.max_bytes = self.n_bytes + size, max(self.max_bytes, size)
 
@@ -57,6 +60,7 @@ def summarise(bag: Bag, progress: Callable[[int], None]) -> BagSummary:
         duration_s=1e-9 * (whole.last_ns - whole.first_ns),
         n_messages=whole.n,
         n_bytes=whole.n_bytes,
+        pause_s=1e-9 * whole.pause_ns,
         topics=[
             TopicSummary(*key, each.n, each.rate_hz, each.n_bytes / max(1, each.n), each.max_bytes)
             for key, each in sorted(seen.items())

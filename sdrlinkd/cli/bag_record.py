@@ -68,7 +68,7 @@ def record(
         signal.signal(number, stop)
     catalogue = _Catalogue(runtime_dir)
     writer = BagWriter(out, split, limit)
-    begin = time.monotonic()
+    begin, n_heard = time.monotonic(), 0
     console = Console(stderr=True)
     try:
         with (
@@ -81,6 +81,7 @@ def record(
             while not stopping:
                 message = heard.receive(LOOK_S)
                 if message is not None:
+                    n_heard += 1
                     for each in _recorded(message, catalogue.is_latched(message.topic)):
                         writer.add(each)
                 for each in copies.take():
@@ -90,16 +91,17 @@ def record(
                 if now - synced_at >= min(LONGEST_SYNC_S, max(SYNC_S, lasted_s / SYNC_SHARE)):
                     synced_at = now
                     writer.sync()
-                    live.update(_progress(writer, lasted_s))
+                    live.update(_progress(writer, n_heard, lasted_s))
                 if duration is not None and lasted_s >= duration:
                     break
     finally:
         writer.close()
-    typer.echo(f"recorded {_progress(writer, time.monotonic() - begin)} in {out}")
+    typer.echo(f"recorded {_progress(writer, n_heard, time.monotonic() - begin)} in {out}")
 
 
-def _progress(writer: BagWriter, lasted_s: float) -> str:
-    return f"{writer.n_messages} messages, {writer.n_bytes / 1e6:.2f} MB, {lasted_s:.1f} s"
+def _progress(writer: BagWriter, n_heard: int, lasted_s: float) -> str:
+    """What was recorded; of each message heard, the bag has a note on its reception besides."""
+    return f"{writer.n_messages - n_heard} messages, {writer.n_bytes / 1e6:.2f} MB, {lasted_s:.1f} s"
 
 
 def _recorded(message: Message, is_latched: bool) -> Iterator[Recorded]:

@@ -63,7 +63,7 @@ COMMANDS = {
     "reload": Listed("Make the daemon re-read its topic policies.", ("status",)),
     "pub": Listed("Publish a message to the daemon.", ("messages",)),
     "echo": Listed("Show messages received from other robots.", ("messages",)),
-    "bag": Listed("Recordings of messages.", ("bag", "bag_record")),
+    "bag": Listed("Recordings of messages.", ("bag", "bag_play", "bag_record")),
     "plan": Listed(
         "Plan airtime and worst-case latency by topic; exit code 1 when the traffic does not fit.",
         ("plan",),

@@ -24,13 +24,15 @@ def first_line(verdict: VerdictReport) -> str:
 
 
 def span(seconds: float) -> str:
-    """A time span as text: `12 s`, `3 min 20 s`, `2 h 5 min`."""
+    """A time span as text: `12 s`, `3 min 20 s`, `2 h 5 min`, `400 d`."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"
+    if whole < 100 * 3600:
+        return f"{whole // 3600} h {whole % 3600 // 60} min"
+    return f"{whole // 86400} d"
 
 
 def percent(share: float) -> str:

@@ -168,7 +168,7 @@ def test_a_bag_with_another_type_is_left_out_by_name(start_daemon, ctl, recorded
     assert code == 0
     assert "played 100 messages" in out
     assert (
-        "/odom (type nav_msgs/msg/Odometry, but the registry has std_msgs/msg/String)"
+        "/odom (its type is nav_msgs/msg/Odometry; the daemon carries std_msgs/msg/String there)"
         in " ".join(err.split())
     )
     assert daemon.snapshot().link.tx.dropped == {}

@@ -122,5 +122,5 @@ def test_a_bag_with_messages_that_are_too_large_is_played_without_them(start_dae
             odom.child_frame_id = "x" * (500 * (i % 2))
             writer.write(connection, i + 1, to_cdr(odom, ODOM))
     code, out, err = ctl("bag", "play", tmp_path / "bag", "--runtime-dir", daemon.directory)
-    assert (code, "played 3 messages" in out) == (0, True)
-    assert "not sent: 3 messages of /odom (/robot_1/odom: too large: " in " ".join(err.split())
+    assert (code, "played 3 messages" in out) == (1, True)
+    assert "not sent: 3 messages of /robot_1/odom (too large: " in " ".join(err.split())

@@ -283,7 +283,8 @@ def test_row_20_a_flood_of_declared_topics(start_daemon, lasting, figure):
 def test_row_24_stops_that_stutter(start_daemon, lasting, figure):
     """The daemon is stopped again as soon as it has awoken: what waited meanwhile is old.
 
-    Its producer tells no times.
+    Its producer tells no times. A message that the daemon has handed over just before a stop may
+    still wait for its consumer in ZeroMQ, but says when that was.
     """
     daemon = start_daemon("[topic.odom]\nlifespan_s = 1.0\ndepth = 0\n")
     rng, sent, late, stops, is_over = Random(24), 0, 0, 0, threading.Event()
@@ -307,7 +308,8 @@ def test_row_24_stops_that_stutter(start_daemon, lasting, figure):
                 message = heard.receive(0.1)
                 if message is not None:
                     stamp = struct.unpack_from("<d", message.payload, 4)[0]
-                    ages.append(time.monotonic() - stamp)
+                    told = message.age_us / 1e6 + time.time() - message.received_ns / 1e9
+                    ages.append((message.age_us / 1e6, time.monotonic() - stamp - told))
 
     threads = [threading.Thread(target=each) for each in (produce, listen)]
     for each in threads:
@@ -324,12 +326,12 @@ def test_row_24_stops_that_stutter(start_daemon, lasting, figure):
     for each in threads:
         each.join()
     context.term()
-    late = sum(age > 2.0 for age in ages)
+    late = sum(age > 1.0 or more > 1.0 for age, more in ages)
     assert problems(daemon) == []
     assert late == 0
     figure(
         24, "stops that stutter, a producer without times",
-        f"{stops} stops; {len(ages)} of {sent} messages heard, the oldest {max(ages):.1f} s old",
+        f"{stops} stops; {len(ages)} of {sent} messages heard, the oldest {max(ages)[0]:.1f} s old",
     )  # fmt: skip
 
 

@@ -12,6 +12,8 @@ from sdrlinkd.adapters.salvage.base import Piece
 from sdrlinkd.adapters.salvage.bounds import MOST_BYTES, PIECE
 
 MAGIC = b"\x89MCAP0\r\n"
+ENCODINGS = ("cdr", "", "ros1")
+"""Message encodings that can be played; others are no ROS messages."""
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 3, 4, 5, 6
 _RECORD = struct.Struct("<BQ")
 
@@ -21,20 +23,26 @@ def salvage(path: Path) -> Iterator[Piece]:
     data = path.read_bytes()
     if not data.startswith(MAGIC):
         return
-    schemas: dict[int, str] = {}
-    channels: dict[int, tuple[str, str]] = {}
+    schemas: dict[int, tuple[str, str]] = {}
+    channels: dict[int, tuple[str, str, str]] = {}
     for op, content in _top_records(data[len(MAGIC) :]):
         if op == _SCHEMA:
-            name, _ = _text(content, 2)
-            schemas[int.from_bytes(content[:2], "little")] = name
+            name, at = _text(content, 2)
+            _, at = _text(content, at)
+            definition = content[at + 4 :].decode(errors="replace")
+            schemas[int.from_bytes(content[:2], "little")] = (name, definition)
         elif op == _CHANNEL:
             number, schema = struct.unpack_from("<HH", content)
-            topic, _ = _text(content, 4)
-            channels[number] = (topic, schemas.get(schema, ""))
+            topic, at = _text(content, 4)
+            encoding, _ = _text(content, at)
+            name, definition = schemas.get(schema, ("", ""))
+            if encoding in ENCODINGS:
+                channels[number] = (topic, name, definition if encoding == "ros1" else "")
         elif op == _MESSAGE:
             number, _, time_ns, _ = struct.unpack_from("<HIQQ", content)
             if number in channels:
-                yield Piece(*channels[number], time_ns, content[22:])
+                topic, name, definition = channels[number]
+                yield Piece(topic, name, time_ns, content[22:], definition)
 
 
 def _top_records(data: bytes) -> Iterator[tuple[int, bytes]]:
