@@ -14,7 +14,7 @@ from sdrlinkd.errors import DeclarationError
 from sdrlinkd.link import HeardTopic, Link
 from sdrlinkd.offers import Declaration
 from sdrlinkd.policies import Policies
-from sdrlinkd.wire import read_origin, topic_type
+from sdrlinkd.wire import FIRST_NUMBER, read_origin, topic_type
 
 if TYPE_CHECKING:
     # Its package imports the bag readers, which the daemon on a robot does not need.
@@ -82,6 +82,18 @@ class Declaring:
             "lifespan_s": policy.lifespan_s,
             "durability": policy.durability,
         }
+
+    def undeclare(self, arguments: dict[str, Any]) -> dict[str, Any]:
+        """Note that a topic's last producer has ended: another type may take its name at once.
+
+        Raises DeclarationError for a topic that nobody declared.
+        """
+        given = str(arguments.get("name", ""))
+        topic = self._link.topic_named(self._setup.name_on_air(given))
+        if topic is None or topic.id < FIRST_NUMBER:
+            raise DeclarationError(f"name: got {shown(given)!r}; allowed: a declared topic")
+        self._link.undeclare(topic.id)
+        return {"topic": given, "type": topic.type}
 
     def _check_name(self, given: str, name: str) -> None:
         """Raise DeclarationError if a bus topic cannot be that of the topic `name` on the air."""

@@ -86,6 +86,9 @@ def make_verbs(
             lambda arguments: declaring.declare(opening.pdu_link.now(), arguments),
             "take a topic from now on, with its type and QoS",
         ),
+        "undeclare": Verb(
+            declaring.undeclare, "let another type have the name of a topic that was declared"
+        ),
         "declared": Verb(lambda _: declaring.declared(), "topics that other robots declared"),
         "demand": Verb(
             lambda arguments: declaring.demand(opening.pdu_link.now(), arguments),

@@ -2,14 +2,13 @@
 
 import fcntl
 import os
-import socket
 import stat
 from collections.abc import Mapping
 from pathlib import Path
 
 import zmq
 
-from sdrlinkd.client import endpoint
+from sdrlinkd.client import endpoint, is_open
 from sdrlinkd.errors import BusError
 from sdrlinkd.files import unwritable
 
@@ -56,7 +55,7 @@ class RuntimeDirectory:
     ) -> zmq.Socket[bytes]:
         """A socket bound to `name` in this directory, for owner and group only. Raises BusError."""
         path = self.path / name
-        if _is_live(path):
+        if is_open(path):
             raise BusError(
                 f"{path} is in use by another program; stop it, or set another bus.runtime_dir"
             )
@@ -161,15 +160,3 @@ def _refuse_foreign(path: Path) -> None:
             f"bus.runtime_dir: {path} belongs to another user or is open to all; name a directory "
             "that this user owns"
         )
-
-
-def _is_live(path: Path) -> bool:
-    """Whether a program accepts connections at `path`."""
-    if not path.exists():
-        return False
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-        try:
-            probe.connect(os.fspath(path))
-        except OSError:
-            return False
-    return True

@@ -101,7 +101,9 @@ def record(
 
 def _progress(writer: BagWriter, n_heard: int, lasted_s: float) -> str:
     """What was recorded; of each message heard, the bag has a note on its reception besides."""
-    return f"{writer.n_messages - n_heard} messages, {writer.n_bytes / 1e6:.2f} MB, {lasted_s:.1f} s"
+    return (
+        f"{writer.n_messages - n_heard} messages, {writer.n_bytes / 1e6:.2f} MB, {lasted_s:.1f} s"
+    )
 
 
 def _recorded(message: Message, is_latched: bool) -> Iterator[Recorded]:

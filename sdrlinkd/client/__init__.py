@@ -53,6 +53,7 @@ from sdrlinkd.client.paths import (
     IN_SOCKET,
     OUT_SOCKET,
     endpoint,
+    is_open,
     runtime_dir,
 )
 from sdrlinkd.client.publisher import Publisher
@@ -90,6 +91,7 @@ __all__ = [
     "Subscriber",
     "check_wishes",
     "endpoint",
+    "is_open",
     "no_daemon",
     "pack_map",
     "runtime_dir",

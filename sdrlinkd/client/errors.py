@@ -1,11 +1,22 @@
 """Errors that the client raises."""
 
+from pathlib import Path
+
+from sdrlinkd.client.paths import CONTROL_SOCKET, is_open
+
 UNKNOWN_TOPIC = "tx_unknown_topic"
 """The ledger's name for a message of a topic that the daemon does not know."""
 
 
 class NoDaemonError(ConnectionError):
-    """No sdrlinkd answers in the runtime directory."""
+    """No sdrlinkd answers in the runtime directory.
+
+    `is_busy`: there is one, but it takes too long.
+    """
+
+    def __init__(self, words: str, *, is_busy: bool = False) -> None:
+        super().__init__(words)
+        self.is_busy = is_busy
 
 
 class MessageRefusedError(ValueError):
@@ -31,8 +42,14 @@ def prepared(runtime_dir: object) -> NoDaemonError:
     )
 
 
-def no_daemon(runtime_dir: object) -> NoDaemonError:
-    """The error for a runtime directory without a daemon."""
+def no_daemon(runtime_dir: Path) -> NoDaemonError:
+    """The error for a runtime directory where nobody answers: no daemon, or one that is busy."""
+    if is_open(runtime_dir / CONTROL_SOCKET):
+        return NoDaemonError(
+            f"the sdrlinkd in {runtime_dir} does not answer in time: its computer is busy, or it "
+            "was stopped; try again",
+            is_busy=True,
+        )
     return NoDaemonError(
         f"no sdrlinkd answers in {runtime_dir}; start one (sdrlinkd --config FILE), or name its "
         "directory with SDRLINKD_RUNTIME_DIR; only members of its group may open a service's"

@@ -1,6 +1,7 @@
 """Where the daemon's sockets are."""
 
 import os
+import socket
 from pathlib import Path
 
 IN_SOCKET = "in.sock"
@@ -59,3 +60,17 @@ def is_prepared(directory: Path) -> bool:
 def endpoint(directory: Path, socket: str) -> str:
     """The ZeroMQ endpoint of a socket in the runtime directory."""
     return f"ipc://{directory / socket}"
+
+
+def is_open(path: Path) -> bool:
+    """Whether a program accepts connections at the socket `path`."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        # A backlog that is full is that of a program which is there.
+        probe.setblocking(False)
+        try:
+            probe.connect(os.fspath(path))
+        except BlockingIOError:
+            return True
+        except (OSError, ValueError):
+            return False
+    return True

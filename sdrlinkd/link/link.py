@@ -398,6 +398,10 @@ class Link:
         self._scheduler.more_to_send()
         return topic
 
+    def undeclare(self, topic_id: int) -> None:
+        """Let another type have the topic's name at once, as its producers have ended."""
+        self._intake.unused(topic_id)
+
     def topic(self, topic_id: int) -> Topic:
         """One of this robot's topics."""
         return self._topics[topic_id]

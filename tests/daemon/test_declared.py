@@ -122,6 +122,29 @@ def test_several_producers_of_a_topic(start_daemon):
     assert (told["durability"], told["depth"]) == ("transient_local", 2)
 
 
+def test_once_its_producers_have_ended_another_type_may_have_the_name(start_daemon):
+    daemon = start_daemon(NO_REGISTRY)
+    first = declare(daemon, "/robot_1/chg")
+    with pytest.raises(RefusedError, match="in use; end that"):
+        ask(daemon, "declare", name="/robot_1/chg", type="std_msgs/msg/Int32")
+    ask(daemon, "undeclare", name="/robot_1/chg")
+    with Subscriber("/rx_robot_1/chg", directory=daemon.directory) as heard:
+        told = ask(daemon, "declare", name="/robot_1/chg", type="std_msgs/msg/Int32")
+        assert (told["type"], told["number"] != first["number"]) == ("std_msgs/msg/Int32", True)
+        with Publisher(daemon.directory) as out:
+            out.send("/robot_1/chg", b"\0\1\0\0\7\0\0\0")
+        assert heard.receive(20).type == "std_msgs/msg/Int32"
+    # A program that goes on to use a name keeps it.
+    ask(daemon, "undeclare", name="/robot_1/chg")
+    with Publisher(daemon.directory) as out:
+        out.send("/robot_1/chg", b"\0\1\0\0\7\0\0\0")
+        out.flush(10)
+    with pytest.raises(RefusedError, match="in use; end that"):
+        declare(daemon, "/robot_1/chg")
+    with pytest.raises(RefusedError, match="allowed: a declared topic"):
+        ask(daemon, "undeclare", name="/robot_1/none")
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -5,6 +5,7 @@ both ends know what must arrive.
 """
 
 import hashlib
+import importlib
 import json
 import os
 import re
@@ -40,15 +41,19 @@ def value(text, old, rng):
         return rng.randrange(-1000, 1000) / 8
     if text == "boolean":
         return rng.random() < 0.5
-    if "string" in text and "sequence" not in text:
-        return f"text {rng.randrange(1 << 30)}"
     if (array := re.fullmatch(r"(.+)\[(\d+)\]", text)) is not None:
         return [value(array[1], None, rng) for _ in range(int(array[2]))]
-    inner = re.fullmatch(r"sequence<([^,>]+).*", text)[1]
-    if "/" in inner:
-        package, name = inner.split("/")
-        return [filled(kind(f"{package}/msg/{name}").message(), rng) for _ in range(2)]
-    return [value(inner, None, rng) for _ in range(360)]
+    if (sequence := re.fullmatch(r"sequence<(.+?)(?:, (\d+))?>", text)) is not None:
+        inner, most = sequence[1], int(sequence[2] or 360)
+        n = min(most, 2 if "/" in inner else 360)
+        values = [value(inner, None, rng) for _ in range(n)]
+        return b"".join(values) if inner == "octet" and not most else values
+    if (words := re.fullmatch(r"(w?)string(?:<(\d+)>)?", text)) is not None:
+        # A wide one has 16 bits for each character.
+        told = f"text {rng.randrange(1 << 30)}" + ("\u00fc\u20ac" if words[1] else "")
+        return told[: int(words[2] or 100)]
+    package, name = text.split("/")
+    return filled(kind(f"{package}/msg/{name}").message(), rng)
 
 
 def plain(item):
@@ -88,6 +93,11 @@ class Agent:
         self.node = rclpy.create_node(name)
         self.publishers, self.heard, self.senders = {}, {}, []
 
+    def types_of(self, package):
+        """The message types of a package."""
+        module = importlib.import_module(f"{package}.msg")
+        return sorted(f"{package}/msg/{name}" for name in dir(module) if name[0].isupper())
+
     def pub(self, topic, type, key="", **qos):
         made_ = self.node.create_publisher(kind(type).message, topic, profile(qos))
         self.publishers[topic, key] = made_, type
@@ -97,6 +107,9 @@ class Agent:
         message = kind(type).message
         self.node.create_subscription(message, topic, heard.append, profile(qos), raw=True)
         self.heard[topic, "type"] = message
+
+    def unpub(self, topic, key=""):
+        self.node.destroy_publisher(self.publishers.pop((topic, key))[0])
 
     def send(self, topic, first=0, n=1, hz=0.0, key=""):
         """Publish messages of the numbers `first` and up, in the background if `hz` is given."""

@@ -1,6 +1,7 @@
 """What the bridge does with bad input, faults, and changes while it runs."""
 
 import json
+import signal
 import struct
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from sdrlinkd.client import Publisher, Subscriber
 from tests.ros.programs import Agent, Bridge, new_domain
 from tests.ros.team import (
     CARRIER,
+    GRID,
     ODOM,
     SCAN,
     TEXT,
@@ -119,6 +121,95 @@ def test_what_the_robot_sends_follows_its_publishers_and_the_parameters(start_da
         assert heard.receive(WAIT_S).topic == "/rx_robot_1/camera"
 
 
+def test_a_node_that_was_upgraded_is_followed_with_its_new_type(start_daemon, start, hub):
+    """As is a map: a subscriber that has it does not get it again when the robots meet anew."""
+    one = Robot(start, start_daemon(config(hub, 1))).bridged()
+    two = Robot(start, start_daemon(config(hub, 2))).bridged()
+    one.node.pub(topic="/state", type=TEXT)
+    one.node.pub(topic="/map", type=GRID, latched=True, depth=1)
+    one.node.send(topic="/map", first=5)
+    one.node.pub(topic="/diagnostics", type=DIAGNOSTICS)
+    two.node.sub(topic="/robot_1/map", type=GRID, latched=True, depth=1)
+    two.node.sub(topic="/robot_1/diagnostics", type=DIAGNOSTICS)
+    two.node.sub(topic="/robot_1/state", type=TEXT)
+    matched(one, "/state", "/diagnostics")
+    one.node.send(topic="/state", n=3, hz=5)
+    wait_for(lambda: two.node.count(topic="/robot_1/state") == 3, WAIT_S)
+    one.node.unpub(topic="/state")
+    one.node.pub(topic="/state", type="std_msgs/msg/Int32")
+    other = start(Agent, two.domain, "other")
+    other.sub(topic="/robot_1/state", type="std_msgs/msg/Int32")
+    matched(one, "/state")
+
+    def is_followed():
+        one.node.send(topic="/state")
+        return other.count(topic="/robot_1/state") >= 3
+
+    wait_for(is_followed, WAIT_S)
+    wait_for(lambda: two.node.count(topic="/robot_1/map") == 1, WAIT_S)
+    # The bridge tells its own diagnostics once a second to this computer alone.
+    one.node.send(topic="/diagnostics", first=9)
+    wait_for(lambda: two.node.count(topic="/robot_1/diagnostics") >= 1, WAIT_S)
+    assert two.node.got(topic="/robot_1/diagnostics") == one.node.expect(
+        type=DIAGNOSTICS, first=9, n=1
+    )
+    one.daemon.stop()
+    one.daemon.at_work()
+    wait_for(lambda: sent_of(one.daemon, "/map") >= 1, WAIT_S)
+    other.sub(topic="/robot_1/map", type=GRID, latched=True, depth=1)
+    wait_for(lambda: other.count(topic="/robot_1/map") == 1, WAIT_S)
+    # It has come twice over the air.
+    wait_for(lambda: heard_of(two.daemon, "/rx_robot_1/map") == 2, WAIT_S)
+    assert two.node.count(topic="/robot_1/map") == 1
+
+
+def sent_of(daemon, name):
+    return sum(each.sent for each in daemon.snapshot().link.topics if each.name == name)
+
+
+def heard_of(daemon, name):
+    received = daemon.snapshot().link.received
+    return sum(each.delivered for each in received if each.republished_as == name)
+
+
+def test_types_of_every_shape_arrive_equal(start_daemon, start, hub):
+    """Bounded, nested, constant, empty, defaults, arrays, wide strings."""
+    one = Robot(start, start_daemon(config(hub, 1))).bridged()
+    two = Robot(start, start_daemon(config(hub, 2))).bridged()
+    kinds = one.node.types_of(package="test_msgs")
+    assert {"test_msgs/msg/WStrings", "test_msgs/msg/BoundedSequences"} <= {*kinds}
+    topics = {kind: "/" + kind.rsplit("/", 1)[-1].lower() for kind in kinds}
+    for kind, topic in topics.items():
+        one.node.pub(topic=topic, type=kind)
+        two.node.sub(topic=f"/robot_1{topic}", type=kind)
+    matched(one, *topics.values())
+    for kind, topic in topics.items():
+        one.node.send(topic=topic, first=len(kind))
+    for kind, topic in topics.items():
+        wait_for(lambda topic=topic: two.node.count(topic=f"/robot_1{topic}") == 1, WAIT_S)
+        sent = one.node.expect(type=kind, first=len(kind), n=1)
+        assert two.node.got(topic=f"/robot_1{topic}") == sent, kind
+
+
+def test_a_busy_daemon_is_not_said_to_be_away(start_daemon, start, hub):
+    """It is stopped for two seconds; what nodes publish meanwhile arrives."""
+    one = Robot(start, start_daemon(config(hub, 1))).bridged()
+    two = start_daemon(config(hub, 2))
+    one.node.pub(topic="/odom", type=ODOM[1])
+    with Subscriber("/rx_robot_1/odom", directory=two.directory) as heard:
+        matched(one, "/odom")
+        one.node.send(topic="/odom")
+        assert heard.receive(WAIT_S) is not None
+        one.daemon.send_signal(signal.SIGSTOP)
+        one.bridge.says("the daemon answers slowly (more than 1 s)")
+        one.node.send(topic="/odom", first=1)
+        one.daemon.send_signal(signal.SIGCONT)
+        one.bridge.says("the daemon answers again, after ")
+        assert heard.receive(WAIT_S) is not None
+    assert "start one" not in one.bridge.log()
+    assert one.node.matched(topic="/odom") == 1
+
+
 def test_a_daemon_that_ends_and_starts_again_is_waited_for(start_daemon, start, hub):
     one = Robot(start, start_daemon(config(hub, 1))).bridged()
     two = start_daemon(config(hub, 2))
@@ -171,7 +262,7 @@ def test_transforms_of_others_are_merged_and_never_go_back(start_daemon, start, 
         wait_for(lambda robot=robot: robot.node.count(topic="/diagnostics") > 0, WAIT_S)
     _, ((level, name, words, robot_name, values),) = one.node.last(topic="/diagnostics")
     assert (name, robot_name) == ("sdrlinkd: link of robot 1", "robot_1")
-    assert (level, words) == ([0], "OK")
+    assert (level, words) == ([0], "OK, in the clear")
     assert "robot 2 SNR (dB)" in [key for key, _ in values]
 
 

@@ -308,7 +308,7 @@ def test_row_24_stops_that_stutter(start_daemon, lasting, figure):
                 message = heard.receive(0.1)
                 if message is not None:
                     stamp = struct.unpack_from("<d", message.payload, 4)[0]
-                    told = message.age_us / 1e6 + time.time() - message.received_ns / 1e9
+                    told = message.age_us / 1e6 + (time.time_ns() - message.received_ns) / 1e9
                     ages.append((message.age_us / 1e6, time.monotonic() - stamp - told))
 
     threads = [threading.Thread(target=each) for each in (produce, listen)]

@@ -244,7 +244,7 @@ class _Parts:
         self.outgoing = Outgoing(self.data, folder, echoes, sayings)
         self.services = Services(self.data, names, folder, sayings)
         self.incoming = Incoming(self.data, names, folder, echoes, sayings, self.services.hear)
-        self.state = State(node)
+        self.state = State(node, echoes)
         self.outgoing.taker.start()
         self.incoming.start()
         self.services.start()

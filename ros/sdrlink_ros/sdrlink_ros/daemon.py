@@ -1,5 +1,6 @@
 """The daemon as the bridge sees it: declarations, demand and status, on the control socket."""
 
+import contextlib
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -32,18 +33,29 @@ class Daemon:
         self._control: ControlClient | None = None
         self._wait_s, self._try_at = FIRST_WAIT_S, 0.0
         self._was_away = False
+        self._busy_since: float | None = None
+        """Since when the daemon has been too slow to answer; None: it answers."""
+        self._demand: Demand | None = None
         self.node = 0
         """The robot's id; 0 until the daemon has answered."""
 
     def look(self, says: str) -> Demand | None:
-        """The demand now; None without a daemon, which is said once.
+        """The demand, the last one if the daemon is busy; None without one, which is said once.
 
         `says` is what `sdrlinkctl status` shows of the bridge.
         """
         told = self.ask("demand", {"says": says})
-        if told is None:
-            return None
-        return Demand(told["boot"], told["version"], frozenset(told["wanted"]))
+        if told is not None:
+            self._demand = Demand(told["boot"], told["version"], frozenset(told["wanted"]))
+        elif self._busy_since is None:
+            self._demand = None
+        # A daemon that is busy still takes messages, and wants what it wanted.
+        return self._demand
+
+    def undeclare(self, bus: str) -> None:
+        """Tell the daemon that no node here publishes a topic any more."""
+        with contextlib.suppress(RefusedError):
+            self.ask("undeclare", {"name": bus})
 
     def declare(self, arguments: dict[str, Any]) -> int | None:
         """Declare a topic; its number, or None without a daemon. Raises RefusedError."""
@@ -82,10 +94,26 @@ class Daemon:
         if self._was_away:
             self._say(f"the daemon of robot {self.node} answers")
         self._wait_s, self._was_away = FIRST_WAIT_S, False
+        if self._busy_since is not None:
+            slow_s = time.monotonic() - self._busy_since
+            self._busy_since = None
+            self._say(
+                f"the daemon answers again, after {slow_s:.1f} s; no message was lost by that"
+            )
         return self._control
 
     def _gone(self, error: NoDaemonError) -> None:
         self.close()
+        if error.is_busy and not self._was_away:
+            if self._busy_since is None:
+                self._busy_since = time.monotonic() - ANSWER_S
+                self._say(
+                    f"the daemon answers slowly (more than {ANSWER_S:g} s), as its computer is "
+                    "busy; messages go on"
+                )
+            self._try_at = time.monotonic() + FIRST_WAIT_S
+            return
+        self._busy_since = None
         if not self._was_away:
             self._say(f"waiting for the daemon; messages are lost meanwhile: {error}")
         self._was_away = True

@@ -15,7 +15,7 @@ from sdrlink_ros.echoes import Echoes
 from sdrlink_ros.kinds import Kind, UnknownTypeError, kind
 from sdrlink_ros.routes import TF_STATIC, Route
 from sdrlink_ros.sayings import Sayings
-from sdrlinkd.client import MessageRefusedError, Publisher, RefusedError
+from sdrlinkd.client import UNKNOWN_TOPIC, MessageRefusedError, Publisher, RefusedError
 
 LINGER_S = 2.0
 """Time in s for which a topic is still taken after the last demand for it."""
@@ -24,6 +24,9 @@ FIRST_REGISTERED = 16
 AGAIN_S = 10.0
 """Time in s after which a refused declaration is tried again."""
 MOST_AT_ONCE = 16
+AGAIN_NS = 50_000_000
+EARLY_S, MOST_EARLY = 5.0, 256
+"""How long, in s, and how many latched messages may wait for the daemon to announce their topic."""
 STOP_S = 2.0
 
 
@@ -40,6 +43,8 @@ class Spec(NamedTuple):
     """What is sent ahead of each message."""
     key: str | None = None
     """The producer key, if it does not depend on the message."""
+    boot: str = ""
+    """Of a latched topic, the start of the daemon: a new one lacks what was latched."""
 
 
 class Tap(NamedTuple):
@@ -81,6 +86,12 @@ class Outgoing:
             self._again_at.clear()
         for name in [each for each in self.refused if each not in routes]:
             self._clear(name)
+        for name, told in list(self._told.items()):
+            route = routes.get(name)
+            if route is None or told[:2] != _declaration(route)[:2]:
+                # Its last publisher has gone: another type may take the name.
+                daemon.undeclare(told[0])
+                del self._told[name]
         for name, route in routes.items():
             is_new = self._told.get(name) != _declaration(route) or self._is_due(name)
             if is_new and self._declare(name, route, daemon):
@@ -106,8 +117,9 @@ class Outgoing:
                 continue
             offer = route.offer
             specs[name] = Spec(
-                name, kind(offer.kind), route.bus, route.robot, offer.is_reliable, offer.is_latched
-            )
+                name, kind(offer.kind), route.bus, route.robot, offer.is_reliable,
+                offer.is_latched, boot=self._boot if offer.is_latched else "",
+            )  # fmt: skip
         self.taker.take(specs)
 
     def _is_due(self, name: str) -> bool:
@@ -171,6 +183,8 @@ class Taker:
         """Messages that the daemon was not there to take, by topic."""
         self.refused: Counter[str] = Counter()
         """Messages that the daemon does not accept, by topic."""
+        self._early: list[tuple[Spec, bytes, Mapping[str, Any], float]] = []
+        """Latched messages that came before the daemon has announced their topic."""
         self._is_over = False
         self._news = node.create_guard_condition(lambda: None)
         self._thread = threading.Thread(target=self._run, name="taker", daemon=True)
@@ -216,7 +230,10 @@ class Taker:
             for handle in handles:
                 wait_set.add_subscription(handle)
             wait_set.add_guard_condition(guard)
-            wait_set.wait(-1)
+            wait_set.wait(AGAIN_NS if self._early else -1)
+            early, self._early = self._early, []
+            for each in early:
+                self._send(*each, out)
             for pointer in wait_set.get_ready_entities("subscription"):
                 self._forward(by_pointer[pointer], out)
 
@@ -229,9 +246,11 @@ class Taker:
                 return
             cdr, info = taken
             if not self._echoes.is_own(spec.name, cdr):
-                self._send(spec, cdr, info, out)
+                self._send(spec, cdr, info, time.monotonic(), out)
 
-    def _send(self, spec: Spec, cdr: bytes, info: Mapping[str, Any], out: Publisher) -> None:
+    def _send(
+        self, spec: Spec, cdr: bytes, info: Mapping[str, Any], taken_at: float, out: Publisher
+    ) -> None:
         try:
             is_sent = out.send(
                 spec.bus,
@@ -242,6 +261,10 @@ class Taker:
                 wait=False,
             )
         except MessageRefusedError as error:
+            is_early = error.reason == UNKNOWN_TOPIC and time.monotonic() - taken_at < EARLY_S
+            if is_early and spec.is_latched and len(self._early) < MOST_EARLY:
+                self._early.append((spec, cdr, info, taken_at))
+                return
             self.refused[spec.name] += 1
             self._sayings.once(f"{spec.name}: {error}")
             return

@@ -1,6 +1,9 @@
 """A topic of another robot, and its publishers here."""
 
+import hashlib
 import struct
+import time
+from collections import OrderedDict
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -11,6 +14,9 @@ LINGER_S = 5.0
 """Time in s for which the demand for a topic lasts after its last subscriber here has gone."""
 _LITTLE, _BIG = struct.Struct("<iI"), struct.Struct(">iI")
 SECOND_NS = 1_000_000_000
+DIGEST_SIZE = 16
+MOST_SERIES = 32
+"""Producers of a topic whose latched messages are remembered."""
 
 
 class Source(NamedTuple):
@@ -54,16 +60,37 @@ class Outlet:
         self.is_closed = False
         self.is_sealed: bool | None = None
         """Whether the last message came sealed; None: none has come."""
+        self._came_ns: OrderedDict[tuple[int, bytes], int] = OrderedDict()
+        """When each latched message came first, by its series and digest."""
         self.newest = (0, 0)
         """Number and time of reception of the newest message."""
 
     def is_known(self, message: Message) -> bool:
-        """Whether a message kept for late consumers was published before; notes newer ones."""
+        """Whether a latched message was published here before; notes newer ones.
+
+        It comes again from what the daemon keeps, or as its source has met this robot anew. A
+        source that says the same again has published it after the first one came.
+        """
+        if self._came_before(message):
+            return True
         came = message.number, message.received_ns
         if message.is_late and came[0] <= self.newest[0] and came[1] <= self.newest[1]:
             return True
         if message.number:
             self.newest = came
+        return False
+
+    def _came_before(self, message: Message) -> bool:
+        if not self.source.kept:
+            return False
+        key = message.series, hashlib.blake2b(message.payload, digest_size=DIGEST_SIZE).digest()
+        came_ns, published_ns = self._came_ns.get(key), message.published_ns
+        if came_ns is not None and published_ns is not None and published_ns <= came_ns:
+            return True
+        self._came_ns[key] = message.received_ns or time.time_ns()
+        self._came_ns.move_to_end(key)
+        while len(self._came_ns) > MOST_SERIES * self.source.kept:
+            self._came_ns.popitem(last=False)
         return False
 
 

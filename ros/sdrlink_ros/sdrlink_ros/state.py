@@ -5,7 +5,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.serialization import serialize_message
 from std_msgs.msg import String
+
+from sdrlink_ros.echoes import Echoes
 
 LEVELS = {
     "OK": DiagnosticStatus.OK,
@@ -13,6 +16,7 @@ LEVELS = {
     "DOWN": DiagnosticStatus.ERROR,
 }
 DEPTH = 1
+DIAGNOSTICS = "/diagnostics"
 
 
 class State:
@@ -24,9 +28,10 @@ class State:
     topics: what the bridge sends and publishes, and why it leaves out the others.
     """
 
-    def __init__(self, node: Any) -> None:  # noqa: ANN401
+    def __init__(self, node: Any, echoes: Echoes) -> None:  # noqa: ANN401
         self._node = node
-        self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", DEPTH)
+        self._echoes = echoes
+        self._diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS, DEPTH)
         self._status = node.create_publisher(String, "/link/status", DEPTH)
         self._topics = node.create_publisher(String, "/link/topics", DEPTH)
 
@@ -44,7 +49,10 @@ class State:
         stamp = self._node.get_clock().now().to_msg()
         array = DiagnosticArray(status=[status])
         array.header.stamp = stamp
-        self._diagnostics.publish(array)
+        # Other robots get this robot's /diagnostics without the bridge's own.
+        cdr = serialize_message(array)
+        self._echoes.sent(DIAGNOSTICS, cdr)
+        self._diagnostics.publish(cdr)
         if snapshot is not None:
             self._status.publish(String(data=json.dumps(snapshot, allow_nan=False, default=str)))
         self._topics.publish(String(data=json.dumps(topics)))

@@ -85,6 +85,10 @@ class Intake:
         """Note that somebody uses a topic: a producer that has declared it."""
         self._topics[topic_id].used_at = now
 
+    def unused(self, topic_id: int) -> None:
+        """Note that a topic's producers have ended; the next message says otherwise."""
+        self._topics[topic_id].used_at = -inf
+
     def is_idle(self, topic_id: int, now: float) -> bool:
         """Whether nobody has declared a topic or sent a message of it for IDLE_S."""
         return now - self._topics[topic_id].used_at >= IDLE_S
