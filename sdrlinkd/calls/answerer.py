@@ -126,7 +126,7 @@ class Answerer:
         return oldest is not None
 
     def _refusal(self, packet: Packet, took_s: float | None, now: float) -> int:
-        # A result can be asked for as often as one likes.
+        # A result can be asked for, and a goal be cancelled, as often as one likes.
         age_s = packet.age_s + (UNKNOWN_AGE_S if took_s is None else took_s)
         is_older = age_s > min(now - self._began_at, KEPT_S)
         return Status.RESTARTED if is_older and not packet.is_long else Status.OK

@@ -62,8 +62,11 @@ class Packet(NamedTuple):
 
     @property
     def is_long(self) -> bool:
-        """Whether it asks for the result of an action."""
-        return self.name.endswith(GET_RESULT)
+        """Whether it asks for the result of an action, or cancels its goals.
+
+        Both may be asked for as long as the goal lasts, also over an outage.
+        """
+        return self.name.endswith((GET_RESULT, CANCEL_GOAL))
 
     @property
     def is_cancel(self) -> bool:

@@ -277,10 +277,19 @@ class Agent:
         return len(self.feedback)
 
     def cancel_goal(self):
-        future = self.goal.cancel_goal_async()
-        while not future.done():
+        self.begin_to_cancel()
+        while self.cancelled() is None:
             time.sleep(0.01)
-        return len(future.result().goals_canceling)
+        return self.cancelled()
+
+    def begin_to_cancel(self):
+        self.cancelling = self.goal.cancel_goal_async()
+
+    def cancelled(self):
+        """How many goals are cancelled by the last request; None without an answer."""
+        if not self.cancelling.done():
+            return None
+        return len(self.cancelling.result().goals_canceling)
 
     def result_of_goal(self):
         """(status, sequence) of the last goal; None while there is none."""

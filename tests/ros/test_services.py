@@ -83,6 +83,18 @@ def test_an_action_survives_an_outage_in_its_middle_and_can_be_cancelled(robots,
     assert status == CANCELED
     assert sequence == numbers[: len(sequence)]
     assert one.node.n_goals() == 2, "no goal was sent twice"
+    # Cancelled while nothing arrives, for longer than any other call takes.
+    assert two.node.send_goal(name="/robot_1/fibonacci", order=400)
+    wait_for(lambda: two.node.n_feedback() > 2, WAIT_S)
+    air.is_cut = True
+    two.node.wait(seconds=5.0)
+    two.node.begin_to_cancel()
+    two.node.wait(seconds=9.0)
+    assert two.node.cancelled() is None
+    air.is_cut = False
+    wait_for(lambda: two.node.cancelled() == 1, WAIT_S)
+    wait_for(lambda: two.node.result_of_goal() is not None, WAIT_S)
+    assert two.node.result_of_goal()[0] == CANCELED
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from sdrlink_ros.directory import request_hash
 from sdrlink_ros.kinds import ServiceKind, service_kind
 from sdrlink_ros.names import Names
 from sdrlink_ros.sayings import Sayings
-from sdrlinkd.calls import WORDS, Asker, Ended, Packet, Sent, Service, Status
+from sdrlinkd.calls import ACTION, WORDS, Asker, Ended, Packet, Sent, Service, Status
 
 MOST_PROXIES = 500
 
@@ -71,17 +71,19 @@ class Proxies:
         return list(self._proxies.values())
 
     def settle(self, offered: Mapping[int, list[Service]]) -> None:
-        """Have a proxy for each service that the robots offer. A call that is under way keeps its
-        proxy.
+        """Have a proxy for each service that the robots offer.
+
+        A call that is under way keeps its proxy, and a goal all those of its action: it can be
+        cancelled though its robot is silent.
         """
         wanted = {
             self._names.here(robot, service.name[1:]): (robot, service)
             for robot, services in offered.items()
             for service in services
         }
-        in_use = {asked.proxy.server for asked in self._asked.values()}
+        in_use = {_whole(asked.proxy) for asked in self._asked.values()}
         for name, proxy in list(self._proxies.items()):
-            if wanted.get(name) != (proxy.robot, proxy.service) and proxy.server not in in_use:
+            if wanted.get(name) != (proxy.robot, proxy.service) and _whole(proxy) not in in_use:
                 del self._proxies[name]
                 self._node.destroy_service(proxy.server)
         for name, (robot, service) in wanted.items():
@@ -146,6 +148,11 @@ class Proxies:
         words = WORDS.get(status, WORDS[Status.OTHER_TYPE])
         self._counts[words] += 1
         self._sayings.say(f"{proxy.service.name} of robot {proxy.robot}: {words}")
+
+
+def _whole(proxy: Proxy) -> tuple[int, str]:
+    """The service that a proxy stands for, or the action of which it is a part."""
+    return proxy.robot, proxy.service.name.split(ACTION)[0]
 
 
 def _never(_: Any, response: Any) -> Any:  # noqa: ANN401
