@@ -3,6 +3,7 @@
 from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.bounds import AccessBound, access_bounds
 from sdrlinkd.plan.model import ClassPlan, Plan, TopicPlan, make_plan
+from sdrlinkd.plan.response import Worst
 from sdrlinkd.plan.setting import HOST_S, MOST_ROBOTS, bounds_of, setting_of
 from sdrlinkd.plan.team import team_worst_s
 from sdrlinkd.plan.traffic import (
@@ -24,6 +25,7 @@ __all__ = [
     "Plan",
     "Setting",
     "TopicPlan",
+    "Worst",
     "access_bounds",
     "bounds_of",
     "loads_from_bag",

@@ -15,7 +15,7 @@ from sdrlinkd.link import (
 from sdrlinkd.plan.advice import slower
 from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.bounds import AccessBound
-from sdrlinkd.plan.response import FOREVER, Task, worst_s
+from sdrlinkd.plan.response import FOREVER, Task, Worst, worst_of
 from sdrlinkd.plan.supply import Supply, supply_of
 from sdrlinkd.plan.traffic import LeftOut, Load, after_policy
 from sdrlinkd.wire import (
@@ -45,9 +45,14 @@ class TopicPlan(NamedTuple):
     size: float
     pdus: int
     air: float
-    worst_s: float
+    worst: Worst
     lifespan_s: float
     rate_mbps: float
+
+    @property
+    def worst_s(self) -> float:
+        """Worst-case latency in s; infinity: unbounded."""
+        return self.worst.whole_s
 
     @property
     def is_late(self) -> bool:
@@ -119,7 +124,7 @@ def _judged(
     topics = [
         TopicPlan(
             task.load.name, task.qos.label, task.load.rate_hz, task.load.size, task.pdus,
-            task.cost_s / task.period_s, worst_s(task, tasks, setting, supply),
+            task.cost_s / task.period_s, worst_of(task, tasks, setting, supply),
             lifespan_of(task.policy, task.qos, setting.classes).seconds,
             8e-6 * task.load.rate_hz * task.load.size,
         )

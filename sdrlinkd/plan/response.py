@@ -48,8 +48,29 @@ class Task(NamedTuple):
     bursts: int
 
 
-def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply) -> float:
-    """Largest age in s at which a message of `task` is handed over; infinity: unbounded."""
+class Worst(NamedTuple):
+    """The largest age of a message when it is handed over, in s, by its parts.
+
+    `turn_s` is the wait for a turn on the air that was just missed, `queue_s` that for other
+    messages, `air_s` the message's own bursts, `rest_s` reception and hosts.
+    """
+
+    turn_s: float
+    queue_s: float
+    air_s: float
+    rest_s: float
+
+    @property
+    def whole_s(self) -> float:
+        """The sum of all parts; infinity: unbounded."""
+        return sum(self)
+
+
+UNBOUNDED = Worst(0.0, FOREVER, 0.0, 0.0)
+
+
+def worst_of(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply) -> Worst:
+    """The largest age at which a message of `task` is handed over."""
     lower = [other for other in tasks if other.rank > task.rank]
     before = [other for other in tasks if other.rank <= task.rank and other is not task]
     beside = _beside(task, lower, supply)
@@ -57,7 +78,7 @@ def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply)
     demand = own + sum(other.cost_s / other.period_s for other in beside)
     demand += sum(min(each.cost_s / each.period_s, _ratio(each, task) * own) for each in before)
     if demand * (1 + supply.others) > supply.share:
-        return FOREVER
+        return UNBOUNDED
     found_s, done_s = 0.0, 0.0
     # If a message is not done before the next one comes, a later one may have the largest latency.
     for number in range(1, MOST_WAITING):
@@ -67,8 +88,13 @@ def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply)
         if done_s <= number * task.period_s or done_s == FOREVER:
             break
     else:
-        return FOREVER
-    return found_s + setting.traits.react_s + setting.host_s
+        return UNBOUNDED
+    if found_s == FOREVER:
+        return UNBOUNDED
+    air_s = min(found_s, task.most_s + task.bursts * supply.passed_s)
+    turn_s = min(found_s - air_s, supply.gap_s)
+    rest_s = setting.traits.react_s + setting.host_s
+    return Worst(turn_s, found_s - air_s - turn_s, air_s, rest_s)
 
 
 def _blocked_s(

@@ -129,7 +129,7 @@ def _times(traits: PduLinkTraits, host_s: float) -> str:
     if traits.tx_window_s < float("inf"):
         windows = f", {1e3 * traits.rx_window_s:.0f} ms between two TX windows"
     return (
-        f"each worst case includes: lead {1e3 * traits.lead_s:.3g} ms{windows}, "
-        f"reception {1e3 * traits.react_s:.3g} ms, hosts {1e3 * host_s:.3g} ms "
-        "(--host; `sdrlinkctl doctor` measures it)"
+        f"turn includes: lead {1e3 * traits.lead_s:.3g} ms{windows}; rest is: reception "
+        f"{1e3 * traits.react_s:.3g} ms, hosts {1e3 * host_s:.3g} ms (--host; `sdrlinkctl doctor` "
+        "measures it)"
     )

@@ -15,7 +15,7 @@ from sdrlinkd.cli.screens import StatusScreen, daemons_table, latency_screen
 from sdrlinkd.demo import RunResult, TopicResult, table_6, topic_table
 from sdrlinkd.iq import modem_info
 from sdrlinkd.lab import LabState, live_table, pair_table
-from sdrlinkd.plan import Plan, TopicPlan
+from sdrlinkd.plan import Plan, TopicPlan, Worst
 from sdrlinkd.tables import FittedTable, bar, figure, words, wrapped
 from tests.cli.pictures import assert_stored, drawn
 from tests.cli.snapshots import LONG, SNAPSHOT, busy
@@ -26,6 +26,7 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 LATENCY = {"p50": 347.25, "p90": 400.0, "p99": 2144.67, "max": 3000.0}
 
 SUMMARY = BagSummary(
+    pause_s=0.0,
     duration_s=3600.0,
     n_messages=1_234_567,
     n_bytes=10**11,
@@ -52,8 +53,12 @@ def run(kind: str, topic: str) -> RunResult:
 def planned(topic: str) -> Plan:
     """An invented plan."""
     topics_of = [
-        TopicPlan(topic, "latency", 123.4, 65536.0, 6500, 0.613, 12.3456, 1.0, 34.94),
-        TopicPlan("odom", "default", 30.0, 724.0, 1, 0.045, 0.0069, 2.0, 0.174),
+        TopicPlan(
+            topic, "latency", 123.4, 65536.0, 6500, 0.613, Worst(8, 2, 2.3, 0.0456), 1.0, 34.94
+        ),
+        TopicPlan(
+            "odom", "default", 30.0, 724.0, 1, 0.045, Worst(0.001, 0.002, 0.003, 0.0009), 2.0, 0.174
+        ),
     ]
     notes = [
         "3 robots, 5 Msps, access tdma, as configured; 86 % of the airtime is usable",

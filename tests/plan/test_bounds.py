@@ -78,10 +78,38 @@ def test_the_waits_come_with_the_robots_of_the_configuration(tmp_path, capsys):
     assert code == 0
     assert "longest wait for the air" in said.out
     assert "no topics to plan" in said.out
-    _, said = told(tmp_path, capsys, "tdma", "--topic", "scan:5:100", "--json")
+    _, said = told(tmp_path, capsys, "tdma", "--json")
     found = json.loads(said.out)["bounds"]
     assert [each["robots"] for each in found] == [3] * 4
     assert all(each["first_s"] > 0 for each in found)
+
+
+@pytest.mark.slow
+def test_there_is_one_worst_case_and_its_parts_add_up(tmp_path, capsys):
+    _, said = told(tmp_path, capsys, "tdma", "--topic", "scan:5:100", "--json")
+    found = json.loads(said.out)
+    assert found["bounds"] == []
+    (topic,) = found["topics"]
+    assert sum(topic["worst"].values()) == pytest.approx(topic["worst_s"])
+    assert all(part >= 0 for part in topic["worst"].values())
+    assert topic["p99_s"] is None
+    _, said = told(tmp_path, capsys, "tdma", "--topic", "scan:5:100")
+    assert said.out.splitlines()[0].endswith(": feasible")
+    assert "longest wait for the air" not in said.out
+
+
+@pytest.mark.parametrize(
+    ("policy", "options", "words"),
+    [
+        ("none", ("--robots", "1..8"), "the access policy is none, which has no longest wait"),
+        ("tdma", ("--robots", "1..8", "--topic", "scan:5:100"), "with topics; allowed: one number"),
+        ("tdma", ("--team", "--topic", "scan:5:100"), "--topic: given with --team"),
+        ("tdma", ("--team", "--robots", "3"), "--robots: given with --team"),
+    ],
+)
+def test_what_would_be_ignored_is_refused(tmp_path, capsys, policy, options, words):
+    code, said = told(tmp_path, capsys, policy, *options)
+    assert (code, words in said.err) == (2, True), said.err
 
 
 @pytest.mark.slow
