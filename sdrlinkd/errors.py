@@ -17,7 +17,8 @@ Any other exception is a bug of ours. One such bug has a class of its own: Illeg
 """
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
 
 
 class SdrlinkError(Exception):
@@ -41,6 +42,17 @@ def ungrouped() -> Iterator[None]:
         while isinstance(error, BaseExceptionGroup):
             error = error.exceptions[0]
         raise error from None
+
+
+def did_you_mean(given: str, known: Iterable[str]) -> str:
+    """`; did you mean …?` with the closest name, or the only one that begins so, or has it."""
+    names = list(known)
+    close = get_close_matches(given, names, n=1)
+    text = given.lower()
+    beginning = [name for name in names if text and name.lower().startswith(text)]
+    holding = beginning or [name for name in names if text and text in name.lower()]
+    found = close[0] if close else holding[0] if len(holding) == 1 else ""
+    return f"; did you mean {found}?" if found else ""
 
 
 class ConfigError(UserError):

@@ -88,7 +88,8 @@ COMMANDS = {
         ("bench",),
     ),
     "help": Listed(
-        "Show a how-to page, a configuration key, a ledger name or a command.", ("help",)
+        "Show a how-to page, a word's meaning, a configuration key, a ledger name or a command.",
+        ("help",),
     ),
 }
 """All commands by name, in the order of the help."""

@@ -148,12 +148,12 @@ def _print(found: list["Finding"]) -> None:
     table.add_column()
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
-    for each in found:
+    n = sum(each.state == "bad" for each in found)
+    console = Console(highlight=False)
+    console.print(f"{n} to do" if n else "nothing to do")
+    for each in sorted(found, key=lambda each: each.state != "bad"):
         mark, style = MARKS[each.state]
         table.add_row(Text(mark, style), Text(each.what), Text(each.told))
         if each.to_do:
             table.add_row("", "", Text(f"→ {each.to_do}"))
-    console = Console(highlight=False)
     console.print(table)
-    n = sum(each.state == "bad" for each in found)
-    console.print(f"{n} to do" if n else "nothing to do")

@@ -10,7 +10,7 @@ from rich.text import Text
 from sdrlinkd.cli.app import app, run
 from sdrlinkd.cli.commands import COMMANDS
 from sdrlinkd.link import RX_PDU_REASONS, RX_REASONS, TX_REASONS
-from sdrlinkd.manual import Key, find_how_to, find_key, how_tos, key_names, sections
+from sdrlinkd.manual import Key, find_how_to, find_key, glossary, how_tos, key_names, sections
 from sdrlinkd.tables import FittedTable, screen_console, words
 
 LEDGER = {
@@ -25,7 +25,7 @@ MOST_COLUMNS = 100
 def help_topics(incomplete: str) -> list[str]:
     """Everything that `help` knows and that begins with `incomplete`."""
     ledger = [name for reasons in LEDGER.values() for name in reasons]
-    known = [*(page.name for page in how_tos()), *COMMANDS, *key_names(), *ledger]
+    known = [*(page.name for page in how_tos()), *COMMANDS, *key_names(), *ledger, *glossary()]
     return [each for each in known if each.startswith(incomplete)]
 
 
@@ -34,12 +34,12 @@ def show_help(
     topic: Annotated[
         list[str] | None,
         typer.Argument(
-            help="A page, a configuration key or section, a ledger name, or a command.",
+            help="A page, a word, a configuration key or section, a ledger name, or a command.",
             autocompletion=help_topics,
         ),
     ] = None,
 ) -> None:
-    """Show a how-to page, a configuration key, a ledger name or a command."""
+    """Show a how-to page, a word's meaning, a configuration key, a ledger name or a command."""
     screen = screen_console()
     name = " ".join(topic or ())
     if not name:
@@ -55,6 +55,10 @@ def show_help(
             _print_key(screen, each)
     elif reason := _ledger_name(name):
         screen.print(Text(reason))
+    elif word := glossary().get(name.lower()):
+        also = f"\nElsewhere: {word.elsewhere}." if word.elsewhere else ""
+        screen.print(Text(word.name, "bold"))
+        screen.print(Markdown(word.meaning), Text(also))
     else:
         page = find_how_to(name, help_topics(""))
         screen.print(Markdown(page.text), width=min(screen.width, MOST_COLUMNS))
@@ -67,8 +71,8 @@ def _list_pages(screen: Console) -> None:
     screen.print(table)
     screen.print(
         Text(
-            "\nsdrlinkctl help PAGE, a configuration key (access.policy), a ledger name "
-            "(tx_expired) or a command (bag play)"
+            "\nsdrlinkctl help PAGE, a word (TDMA), a configuration key (access.policy), a ledger "
+            "name (tx_expired) or a command (bag play)"
         )
     )
 

@@ -49,11 +49,9 @@ def list_daemons(as_json: AsJson = False) -> None:
     if not found:
         typer.echo("no sdrlinkd runs on this host; start one: sdrlinkd --config FILE")
         return
-    screen_console().print(
-        daemons_table(
-            [(str(each.directory), each.pid, each.snapshot or each.problem) for each in found]
-        )
-    )
+    console = screen_console()
+    rows = [(str(each.directory), each.pid, each.snapshot or each.problem) for each in found]
+    console.print(daemons_table(rows, console.width))
 
 
 def directories() -> list[Path]:

@@ -1,5 +1,6 @@
 """`pub` and `echo`: publish and show single messages, like `ros2 topic`."""
 
+import contextlib
 import time
 from collections import Counter
 from io import StringIO
@@ -85,8 +86,19 @@ def pub(
     payload = _read(cdr_file) if cdr_file else _serialize(values, kind)
     if times > 1 and not rate:
         rate = 1.0
-    with Publisher(runtime_dir) as publisher:
-        count, waiting, fates = 0, {}, Counter[str]()
+    if rate:
+        until = f"{times} times" if times else "until Ctrl-C"
+        typer.echo(f"publishing {len(payload)} B on {topic} at {rate:g} Hz, {until}", err=True)
+    console = Console(stderr=True)
+    count, waiting, fates = 0, dict[str, int](), Counter[str]()
+    with (
+        Publisher(runtime_dir) as publisher,
+        contextlib.ExitStack() as stack,
+    ):
+        if rate:
+            # Also where Ctrl-C ends it.
+            stack.callback(lambda: typer.echo(f"published {count} × {len(payload)} B on {topic}"))
+        live = stack.enter_context(console.status("")) if rate and console.is_terminal else None
         while True:
             name = publisher.send(
                 topic,
@@ -99,6 +111,8 @@ def pub(
                 receipt=receipt,
             )
             count += 1
+            if live is not None:
+                live.update(f"{count} published")
             if isinstance(name, str):
                 waiting[name] = count
             if not rate or count == times:
@@ -107,7 +121,8 @@ def pub(
             fates += _show_receipts(publisher, waiting, next_at)
             time.sleep(max(0.0, next_at - time.monotonic()))
         fates += _show_receipts(publisher, waiting)
-    typer.echo(f"published {count} × {len(payload)} B on {topic} ({kind})")
+    if not rate:
+        typer.echo(f"published {count} × {len(payload)} B on {topic} ({kind})")
     if fates["unknown"]:
         typer.echo(
             "no answer to some: `sdrlinkctl status` lists the robots that are heard", err=True

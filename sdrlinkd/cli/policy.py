@@ -1,5 +1,6 @@
 """`set` and `why`: change and explain a topic's policy while the daemon runs."""
 
+from math import inf
 from typing import Annotated, Any
 
 import msgspec
@@ -14,6 +15,8 @@ from sdrlinkd.units import octets, seconds
 Topic = Annotated[str, typer.Argument(help="Topic name on the bus or in the registry.",
                                       autocompletion=topic_names)]  # fmt: skip
 Text = str | None
+LONG_S = 60.0
+"""Lifespan in s above which messages of an urgent class are hardly meant to live."""
 QOS = ("urgent", "latency", "default", "bulk")
 
 
@@ -114,6 +117,13 @@ def set_policy(
         typer.echo(
             f"  {key}: {_shown(key, answer['old'][key])} -> {_shown(key, answer['new'][key])}"
         )
+    lifespan_s = changes.get("lifespan_s", 0.0)
+    if LONG_S < lifespan_s < inf and answer["new"]["qos"] in ("urgent", "latency"):
+        typer.echo(
+            f"warning: {answer['new']['qos']} messages may be {lifespan_s:g} s old when they "
+            f"arrive; for milliseconds, give {lifespan_s:g}ms",
+            err=True,
+        )
     if verdict is not None:
         typer.echo(verdict_words(verdict))
 
@@ -131,6 +141,8 @@ def why(topic: Topic, runtime_dir: RuntimeDir = None, as_json: AsJson = False) -
 
 
 def _shown(key: str, value: object) -> str:
+    """A value of a policy's key, with its unit."""
     if value is None:
         return "that of its class" if key == "lifespan_s" else "as in [link]"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    unit = " s" if key.endswith("_s") else " B" if key.endswith("_bytes") else ""
+    return (f"{value:g}" if isinstance(value, float) else str(value)) + unit

@@ -41,8 +41,7 @@ def probe(
         typer.echo(msgspec.json.encode(found))
         return
     if found.binding:
-        names = ", ".join(sorted(each.rsplit("/", 1)[-1] for each in found.modules)) or "none"
-        console.print(f"{found.binding}; driver modules: {names}", highlight=False, soft_wrap=True)
+        console.print(f"{found.binding}; {found.drivers}", highlight=False, soft_wrap=True)
     for each in found.devices:
         console.print(table_of(each, assess_device(each, rate), rate))
     for note in found.notes:

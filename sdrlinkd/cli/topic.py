@@ -11,8 +11,8 @@ from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.completion import heard_names
 from sdrlinkd.cli.spans import Bandwidth, Delay, Measure, Rate
-from sdrlinkd.client import Subscriber
-from sdrlinkd.errors import UserError
+from sdrlinkd.client import ControlClient, Subscriber
+from sdrlinkd.errors import UserError, did_you_mean
 from sdrlinkd.reports import Snapshot
 
 topic_app = typer.Typer(help="Rate, bandwidth and delay of a received topic.", no_args_is_help=True)
@@ -82,7 +82,11 @@ def _measure(
 ) -> None:
     """Print `lately` every second until Ctrl-C or the end, then `whole`. Raises UserError."""
     with connect(runtime_dir) as control:
-        _refuse_own(name, ask_status(control))
+        snapshot = ask_status(control)
+        _refuse_own(name, snapshot)
+        hint = _never_heard(name, snapshot, control)
+    if hint:
+        typer.echo(hint, err=True)
     began_s = tell_s = time.monotonic()
     until_s = math.inf if duration is None else began_s + duration
     heard = told = 0
@@ -105,6 +109,15 @@ def _measure(
             _say(whole.lines())
     if not heard:
         raise UserError(f"{name}: no message received; `sdrlinkctl topics` lists received topics")
+
+
+def _never_heard(name: str, snapshot: Snapshot, control: ControlClient) -> str:
+    """A sentence on a topic that nobody has sent or declared so far; empty if somebody has."""
+    known = {each.republished_as for each in snapshot.link.received}
+    known |= {each["topic"] for each in control.ask("declared")}
+    if name in known or name.endswith("*"):
+        return ""
+    return f"{name}: nothing of this name was heard so far{did_you_mean(name, known)}"
 
 
 def _refuse_own(name: str, snapshot: Snapshot) -> None:

@@ -11,6 +11,7 @@ import typer
 from sdrlinkd.cli.app import RuntimeDirs, app
 from sdrlinkd.cli.listening import host_and_port
 from sdrlinkd.cli.listing import directories
+from sdrlinkd.client import runtime_dir as usual_directory
 from sdrlinkd.config import ENDPOINT, FLEET_NAME, FleetParams
 from sdrlinkd.doors import token_from
 from sdrlinkd.errors import UserError
@@ -30,6 +31,12 @@ def _endpoints(given: list[str] | None) -> list[str] | None:
         if not re.match(ENDPOINT, each):
             raise UserError(f'--connect: got "{each}"; allowed: an endpoint such as tcp/base:7447')
     return given
+
+
+def _own_first() -> list[Path]:
+    """The daemons of this host, the one that other commands would ask first."""
+    own = usual_directory()
+    return sorted(directories(), key=lambda each: each != own)
 
 
 @app.command("web")
@@ -83,7 +90,7 @@ def web(
     )  # fmt: skip
     world = World()
     if fleet is None:
-        find = (lambda: runtime_dir) if runtime_dir else directories
+        find = (lambda: runtime_dir) if runtime_dir else _own_first
         feed = partial(follow_daemons, world, find)
     else:
         params = FleetParams(name=fleet, connect=connect or [], zenoh=str(zenoh or ""))

@@ -33,8 +33,7 @@ def check_radio(config: Config | None, found: ProbeReport | None) -> list[Findin
         told = "; ".join(found.notes)
         to_do = "apt-get install libsoapysdr0.8 soapysdr-tools, and the radio's soapysdr-module-…"
         return [bad("SoapySDR", told, to_do) if is_needed else none("SoapySDR", told)]
-    modules = ", ".join(sorted(Path(each).name for each in found.modules)) or "none"
-    findings = [good("SoapySDR", f"{found.binding}; driver modules: {modules}")]
+    findings = [good("SoapySDR", f"{found.binding}; {found.drivers}")]
     if not found.devices:
         told = "; ".join(found.notes) or "no device was found"
         wanted = "plug it in, or install its driver module; see the lines above"

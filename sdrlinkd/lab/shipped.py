@@ -1,9 +1,8 @@
 """Scenarios that are shipped with the program, by name."""
 
-from difflib import get_close_matches
 from pathlib import Path
 
-from sdrlinkd.errors import UserError
+from sdrlinkd.errors import UserError, did_you_mean
 from sdrlinkd.shipped import shipped_files
 
 
@@ -20,8 +19,7 @@ def find_scenario(given: Path) -> Path:
     name = given.name.removesuffix(".toml")
     if name in shipped or given.suffix == ".toml":
         return shipped.get(name, given)
-    close = get_close_matches(name, shipped, n=1)
-    hint = f"; did you mean {close[0]}?" if close else ""
+    hint = did_you_mean(name, shipped)
     raise UserError(
         f"{given}: no such scenario{hint}; allowed: a TOML file, or one of {', '.join(shipped)}"
     )

@@ -10,16 +10,19 @@ from sdrlinkd.manual.howto import HowTo, find_how_to, how_tos
 from sdrlinkd.manual.keys import Key, Section, find_key, key_names, sections
 from sdrlinkd.manual.python_client import python_client_page
 from sdrlinkd.manual.snapshot import snapshot_page
+from sdrlinkd.manual.words import Word, glossary
 
 __all__ = [
     "HowTo",
     "Key",
     "Section",
+    "Word",
     "commands_page",
     "configuration_page",
     "field_texts",
     "find_how_to",
     "find_key",
+    "glossary",
     "how_tos",
     "key_names",
     "python_client_page",

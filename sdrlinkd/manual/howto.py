@@ -1,10 +1,9 @@
 """The shipped how-to pages."""
 
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 
-from sdrlinkd.errors import UserError
+from sdrlinkd.errors import UserError, did_you_mean
 from sdrlinkd.shipped import shipped_files
 
 
@@ -31,10 +30,9 @@ def find_how_to(name: str, others: list[str]) -> HowTo:
     pages = {each.name: each for each in how_tos()}
     if name in pages:
         return pages[name]
-    close = get_close_matches(name, [*pages, *others], n=1)
-    hint = f"; did you mean {close[0]}?" if close else ""
+    hint = did_you_mean(name, [*pages, *others])
     raise UserError(
-        f"help: got {name}, and there is no such page, key or command{hint}; "
+        f"help: got {name}, and there is no such page, word, key or command{hint}; "
         "`sdrlinkctl help` lists all pages"
     )
 

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import re
+import signal
 import threading
 from functools import partial
 
@@ -392,8 +393,8 @@ def test_a_policy_is_set_while_the_daemon_runs_and_explained(start_daemon, ctl):
     )  # fmt: skip
     assert code == 0
     assert out.splitlines() == [
-        "odom:", "  qos: latency -> bulk", "  priority: 64 -> 90", "  period_s: 0 -> 10",
-        "  lifespan_s: that of its class -> 0.3", "  depth: 1 -> 2", "  compress: none -> zstd",
+        "odom:", "  qos: latency -> bulk", "  priority: 64 -> 90", "  period_s: 0 s -> 10 s",
+        "  lifespan_s: that of its class -> 0.3 s", "  depth: 1 -> 2", "  compress: none -> zstd",
     ]  # fmt: skip
     publish(daemon, 10)
     wait_for(lambda: daemon.snapshot().link.tx.accepted == 10)
@@ -451,3 +452,54 @@ def test_a_dictionary_is_trained_from_a_recording(ctl, tmp_path, monkeypatch):
     code, _, err = ctl("topics", "train-dict", bag, "/none", "--out", tmp_path / "d")
     assert code == 2
     assert "/none: not in" in err
+
+
+@pytest.mark.slow
+def test_publishing_at_a_rate_tells_how_many_also_at_ctrl_c(daemon):
+    dir_ = ("--runtime-dir", daemon.directory)
+    with sdrlinkctl("pub", "odom", "--rate", "20", *dir_) as publishing:
+        before = daemon.snapshot().link.tx.accepted
+        wait_for(lambda: daemon.snapshot().link.tx.accepted >= before + 3)
+        publishing.send_signal(signal.SIGINT)
+        code = publishing.wait(20)
+    assert code == 130
+    assert "publishing 708 B on /robot_1/odom at 20 Hz, until Ctrl-C" in publishing.err()
+    assert re.search(r"published \d+ × 708 B on /robot_1/odom", publishing.out())
+
+
+@pytest.mark.slow
+def test_a_name_that_nobody_sends_is_answered_with_the_nearest(daemon, ctl):
+    dir_ = ("--runtime-dir", daemon.directory)
+    with Publisher(daemon.directory) as out, Subscriber(directory=daemon.directory) as heard:
+        out.send("/robot_1/odom", bytes(724))
+        assert heard.receive(20) is not None
+    code, _, err = ctl("topic", "hz", "/rx_robot_1/odmo", "--duration", "0.1", *dir_)
+    assert code == 2
+    assert "nothing of this name was heard so far; did you mean /rx_robot_1/odom?" in err
+    code, _, err = ctl("topic", "hz", "/rx_robot_1/odom", "--duration", "0.1", *dir_)
+    assert "did you mean" not in err
+
+
+@pytest.mark.slow
+def test_what_is_set_is_shown_with_its_unit(daemon, ctl):
+    dir_ = ("--runtime-dir", daemon.directory)
+    code, out, err = ctl("set", "odom", "--qos", "urgent", "--lifespan", "300", *dir_)
+    assert (code, "-> 300 s" in out) == (0, True)
+    assert "for milliseconds, give 300ms" in err
+    code, out, err = ctl("set", "odom", "--lifespan", "300ms", "--queue-bytes", "4k", *dir_)
+    assert ("300 s -> 0.3 s" in out, "-> 4000 B" in out, err) == (True, True, "")
+
+
+@pytest.mark.parametrize(
+    ("word", "says"),
+    [("tdma", "turns"), ("MCS", "Modulation and coding"), ("PDR", "Share of messages"),
+     ("rssi", "received level")],
+)  # fmt: skip
+def test_help_knows_the_words_of_the_glossary(ctl, word, says):
+    code, out, _ = ctl("help", word)
+    assert (code, says in out) == (0, True), out
+
+
+def test_a_part_of_a_scenarios_name_is_enough_to_be_told_it(ctl):
+    code, _, err = ctl("lab", "three")
+    assert (code, "did you mean three-robots?" in err) == (2, True)

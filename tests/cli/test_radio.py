@@ -28,7 +28,7 @@ def test_a_radio_that_keeps_time(capsys):
     assert run(["radio", "probe", "driver=loopback,model=usrp", "--rate", "5e6"]) == 0
     told = capsys.readouterr().out
     for part in (
-        "libloopbackSupport.so", "0.2 to 61.44 Msps, 50 to 6000 MHz", "TX/RX, RX2",
+        "driver: loopback", "0.2 to 61.44 Msps, 50 to 6000 MHz", "TX/RX, RX2",
         "full duplex; the device times the bursts", "lead 20 ms",
     ):  # fmt: skip
         assert part in told

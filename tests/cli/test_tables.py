@@ -113,7 +113,7 @@ def everything(width: int) -> dict[str, list[object]]:
         "radio probe": [radio.table_of(*probed(f"driver=hackrf,serial={LONG}"), 2e6)],
         "bag info": [bag.table_of(SUMMARY)],
         "topics": [*topics.tables(at.link)],
-        "list": [daemons_table(listed)],
+        "list": [daemons_table(listed, 80)],
         "bench": [table_of("path_cost", bench_rows())],
     }
 

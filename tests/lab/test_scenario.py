@@ -40,7 +40,7 @@ LINK = "[[link]]\nsender = 1\nreceiver = 2\n"
         (ONE + 'path = [[0, "a", 0]]\n', ["s.toml:3: robot.path", '"a"', "a number"]),
         (ONE + TWO + LINK + "snr_db = 500\n", ["link.snr_db", "500", "from -300 to 300"]),
         ("[[robot]]\nid = 255\n", ["s.toml:2: robot.id", "got 255", "from 0 to 254"]),
-        ("nonsense", ["s.toml: not TOML"]),
+        ("nonsense", ["s.toml:1: not TOML"]),
     ],
 )  # fmt: skip
 def test_an_error_cites_file_line_key_given_and_allowed(load, text, parts):

@@ -29,7 +29,12 @@ from backends.soapy.binding.api import (
 from backends.soapy.binding.device import DIRECTIONS, Device
 from backends.soapy.binding.device_args import driver_of, parse_device_args
 from backends.soapy.binding.diagnosis import is_driver_missing, no_radio, not_installed, why_not
-from backends.soapy.binding.library import has_module, load_library, load_native_library
+from backends.soapy.binding.library import (
+    driver_name,
+    has_module,
+    load_library,
+    load_native_library,
+)
 
 __all__ = [
     "CORRUPTION",
@@ -53,6 +58,7 @@ __all__ = [
     "Stream",
     "StreamResult",
     "Values",
+    "driver_name",
     "driver_of",
     "has_module",
     "is_driver_missing",

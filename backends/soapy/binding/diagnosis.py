@@ -1,10 +1,8 @@
 """Explains why a device is not available, in sentences that say what to do."""
 
-from pathlib import Path
-
 from backends.soapy.binding.api import DriverError, Library
 from backends.soapy.binding.device_args import driver_of
-from backends.soapy.binding.library import MODULES, has_module
+from backends.soapy.binding.library import MODULES, driver_name, has_module
 
 
 def is_driver_missing(library: Library, args: str, error: DriverError) -> bool:
@@ -29,9 +27,9 @@ def why_not(library: Library, args: str, error: DriverError) -> str:
     driver = driver_of(args)
     text = str(error)
     if is_driver_missing(library, args, error):
-        there = ", ".join(sorted(Path(each).name for each in library.modules())) or "none"
+        there = ", ".join(sorted(map(driver_name, library.modules()))) or "none"
         return (
-            f'soapy.device: got "{args}", but SoapySDR has no driver "{driver}" (its modules: '
+            f'soapy.device: got "{args}", but SoapySDR has no driver "{driver}" (its drivers: '
             f"{there}); install its module{_package(driver)}, or name another driver"
         )
     if any(word in text.lower() for word in ("busy", "in use", "claimed")):

@@ -1,5 +1,6 @@
 """Which SoapySDR is installed on this machine, and which of its driver modules are loaded."""
 
+import re
 from pathlib import Path
 
 from backends.soapy.binding.api import Library
@@ -9,6 +10,13 @@ MODULES = {
     "plutosdr": "PlutoSDR", "remote": "remote", "rtlsdr": "rtlsdr", "uhd": "uhd",
 }  # fmt: skip
 """Part of the file name of each driver's module; lowercase, it is part of Debian's package name."""
+_FILE = re.compile(r"(?:.*/)?(?:lib)?(.+?)(?:Support)?\.so.*")
+
+
+def driver_name(path: str) -> str:
+    """The driver of a module, as in soapy.device: `hackrf` for `libHackRFSupport.so`."""
+    name = _FILE.sub(r"\1", path)
+    return next((driver for driver, part in MODULES.items() if part == name), name.lower())
 
 
 def load_library() -> Library:

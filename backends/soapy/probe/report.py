@@ -2,7 +2,7 @@
 
 import msgspec
 
-from backends.soapy.binding import Range
+from backends.soapy.binding import Range, driver_name
 from backends.soapy.settings import timestamped_tx
 
 
@@ -51,3 +51,10 @@ class ProbeReport(msgspec.Struct, frozen=True, kw_only=True):
     """Paths of the driver modules that were loaded."""
     devices: list[DeviceProbe]
     notes: list[str] = []
+
+    @property
+    def drivers(self) -> str:
+        """The drivers by name and number, for people: `2 drivers: hackrf, uhd`."""
+        names = sorted(map(driver_name, self.modules))
+        n = len(names)
+        return f"{n} driver{'' if n == 1 else 's'}" + (f": {', '.join(names)}" if names else "")

@@ -9,9 +9,18 @@ from sdrlinkd.cli.screens.rows import LEVEL_STYLES
 from sdrlinkd.reports import Snapshot
 from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
+LEAST, OTHERS = 24, 46
+"""Characters of the shortest column of directories, and of the columns beside it."""
 
-def daemons_table(found: Sequence[tuple[str, int | None, Snapshot | str]]) -> FittedTable:
-    """A table with a row per daemon: (runtime directory, process id, snapshot or problem)."""
+
+def daemons_table(
+    found: Sequence[tuple[str, int | None, Snapshot | str]], width: int
+) -> FittedTable:
+    """A table with a row per daemon: (runtime directory, process id, snapshot or problem).
+
+    Long directories lose their beginning, so that a row takes a line of `width` characters.
+    """
+    room = max(LEAST, width - OTHERS)
     table = FittedTable(
         "",
         (
@@ -19,7 +28,8 @@ def daemons_table(found: Sequence[tuple[str, int | None, Snapshot | str]]) -> Fi
             figure("up"), words("runtime directory", least=20), figure("pid", 2),
         ),
     )  # fmt: skip
-    for directory, pid, at in found:
+    for whole, pid, at in found:
+        directory = whole if len(whole) <= room else f"…{whole[1 - room :]}"
         process = NOTHING if pid is None else str(pid)
         if isinstance(at, str):
             table.add(NOTHING, NOTHING, at, NOTHING, NOTHING, directory, process)

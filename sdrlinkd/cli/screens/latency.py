@@ -19,10 +19,22 @@ PARTS = (
     ("rx", "handover_ms", "·", "green"),
 )
 """Name, field, character and color of each part, in order of time."""
-MEANING = (
-    "queue: behind other messages; access: for channel access; again: after a failed burst; "
-    "frags: from its first fragment to its last; air: the last one; rx: demodulation and "
-    "delivery to the bus"
+Timed = Sequence[tuple[ReceivedTopicReport, LatencyReport]]
+MEANINGS = {
+    "age": "from publication to delivery",
+    "queue": "behind other messages",
+    "access": "for the channel",
+    "again": "after a failed burst",
+    "source": "at the source, all in one",
+    "frags": "from first fragment to last",
+    "air": "the last one",
+    "rx": "demodulation, delivery",
+    "p99": "99 % are younger",
+    "jitter": "of the period",
+}
+CLOCKS = (
+    "clock offset: its host clock behind ours; rate: our radio's clock faster than its; bad "
+    "stamps: times that cannot be"
 )
 
 
@@ -37,15 +49,26 @@ def latency_screen(
     parts: list[RenderableType] = [_waterfalls(timed)]
     if whole:
         parts += [_percentiles(topic, latency) for topic, latency in timed]
-    return [*parts, Text(MEANING, style="dim"), *clocks]
+    told = "; ".join(f"{head}: {MEANINGS[head]}" for head in _heads(timed))
+    return [*parts, Text(told, style="dim"), *clocks, *([Text(CLOCKS, style="dim")] * bool(clocks))]
 
 
-def _waterfalls(timed: Sequence[tuple[ReceivedTopicReport, LatencyReport]]) -> FittedTable:
-    told = [
+def _heads(timed: Timed) -> list[str]:
+    """The heads of the figures' columns, from left to right."""
+    return ["age", *(head for head, _ in _told(timed)), "p99", "jitter"]
+
+
+def _told(timed: Timed) -> list[tuple[str, str]]:
+    """Head and field of each part that is known of a topic."""
+    return [
         (head, field)
         for head, field, *_ in PARTS
         if any(_part_ms(latency, field) is not None for _, latency in timed)
     ]
+
+
+def _waterfalls(timed: Timed) -> FittedTable:
+    told = _told(timed)
     table = FittedTable(
         "latency, recent means in ms",
         (
@@ -114,8 +137,8 @@ def _clocks(link: LinkReport) -> list[FittedTable]:
     table = FittedTable(
         "clocks",
         (
-            words("robot"), words("state", least=18), figure("its host lags by"),
-            figure("our radio gains", 1), figure("jumps", 2), figure("odd stamps", 3),
+            words("robot"), words("state", least=18), figure("clock offset"),
+            figure("rate", 1), figure("jumps", 2), figure("bad stamps", 3),
         ),
     )  # fmt: skip
     for src, clock in known:
