@@ -27,11 +27,11 @@ def gateway(
         Path, typer.Option("--config", metavar="FILE", help="The daemon's configuration (TOML).")
     ] = DEFAULT_CONFIG,
     check: Annotated[
-        bool, typer.Option("--check", help="Check `[fleet]` and the file it names, and exit.")
+        bool, typer.Option("--check", help="Check the table `fleet` and the file it names, and exit.")
     ] = False,
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
-    """Put what the daemon's robots send on Zenoh, and send them what `[fleet]` allows."""
+    """Put what the daemon's robots send on Zenoh, and send them what the table `fleet` allows."""
     if version:
         typer.echo(f"sdrlink-gateway {__version__}")
         return

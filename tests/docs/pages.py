@@ -58,10 +58,18 @@ def commands_of(text):
 
 
 def missing_words(shown, screen):
-    """Words of the lines shown that the screen does not have, by line."""
+    """Words of the lines shown that the screen does not have, by line.
+
+    A line without figures and `…` must be there as it is.
+    """
     there = set(_WORD.findall(screen))
-    return {
-        line: lost
-        for line in shown
-        if (lost := [word for word in _WORD.findall(line) if word not in there])
-    }
+    lines = {" ".join(line.split()) for line in screen.splitlines()}
+    found = {}
+    for line in shown:
+        lost = [word for word in _WORD.findall(line) if word not in there]
+        is_exact = line.strip() and not re.search(r"[\d…─]", line)
+        if not lost and is_exact and " ".join(line.split()) not in lines:
+            lost = [line]
+        if lost:
+            found[line] = lost
+    return found
