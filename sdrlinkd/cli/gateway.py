@@ -27,7 +27,8 @@ def gateway(
         Path, typer.Option("--config", metavar="FILE", help="The daemon's configuration (TOML).")
     ] = DEFAULT_CONFIG,
     check: Annotated[
-        bool, typer.Option("--check", help="Check the table `fleet` and the file it names, and exit.")
+        bool,
+        typer.Option("--check", help="Check the table `fleet` and the file it names, and exit."),
     ] = False,
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
