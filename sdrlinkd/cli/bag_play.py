@@ -92,10 +92,7 @@ def play(
             before = ask_status(control)
             routes = _routed(opened, before, topics or [], remap or [])
             routes.declare(control)
-            if clock:
-                control.ask(
-                    "declare", {"name": CLOCK, "type": CLOCK_TYPE, "reliability": "best_effort"}
-                )
+            clock_topic = _clock_topic(control, before) if clock else ""
         for name, reason in routes.left_out.items():
             console.print(f"left out: {name} ({reason})", style="yellow", markup=False)
         if not routes.to:
@@ -106,7 +103,7 @@ def play(
         part = _Part(opened, routes, start, duration)
         if loop and not part.n_messages:
             raise UserError(f"{bag}: no messages to play again and again; give another --start")
-        played = _Played(routes, clock, runtime_dir, _Dropped(before))
+        played = _Played(routes, clock, clock_topic, runtime_dir, _Dropped(before))
         _play(part, played, rate, max_gap, console, bag.name, loop=loop)
     finally:
         opened.close()
@@ -193,9 +190,11 @@ class _Played:
     """What was sent and refused so far, by topic of the daemon."""
 
     def __init__(
-        self, routes: _Routes, clock: float, runtime_dir: Path | None, dropped: _Dropped
-    ) -> None:
-        self._routes, self._clock, self.runtime_dir = routes, clock, runtime_dir
+        self, routes: _Routes, clock: float, clock_topic: str, runtime_dir: Path | None,
+        dropped: _Dropped,
+    ) -> None:  # fmt: skip
+        self._routes, self.runtime_dir = routes, runtime_dir
+        self._clock, self._clock_topic = clock, clock_topic
         self.dropped = dropped
         self.sent: Counter[str] = Counter()
         self.refused: dict[str, list[str]] = {}
@@ -208,7 +207,7 @@ class _Played:
         name = self._routes.to[message.topic, message.type]
         if self._clock and not 0 <= message.time_ns - self._told_ns < SECOND_NS / self._clock:
             self._told_ns = message.time_ns
-            publisher.send(CLOCK, clock_message(message.time_ns))
+            publisher.send(self._clock_topic, clock_message(message.time_ns))
         try:
             publisher.send(name, message.cdr, type=message.type)
             self.sent[name] += 1
@@ -285,6 +284,16 @@ def clock_message(time_ns: int) -> bytes:
     """A rosgraph_msgs/Clock as CDR."""
     seconds, ns = divmod(time_ns, SECOND_NS)
     return cdr_from_fields(CLOCK_TYPE, {"clock": {"sec": seconds, "nanosec": ns}}, CLOCK)
+
+
+def _clock_topic(control: ControlClient, snapshot: Snapshot) -> str:
+    """The daemon's topic for the recording's time, which is declared if it has none."""
+    own = f"/{snapshot.namespace.strip('/')}{CLOCK}" if snapshot.namespace else CLOCK
+    taken = _taken(snapshot)
+    known = next((name for name in (CLOCK, own) if name in taken), "")
+    if not known:
+        control.ask("declare", {"name": CLOCK, "type": CLOCK_TYPE, "reliability": "best_effort"})
+    return known or CLOCK
 
 
 def _taken(snapshot: Snapshot) -> dict[str, str]:

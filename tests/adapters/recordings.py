@@ -7,6 +7,8 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from sdrlinkd.adapters import BuiltInRobot
+
 CUSTOM = "demo_msgs/msg/Reading"
 CUSTOM_DEFINITION = "std_msgs/Header header\nfloat32 value\nstring unit\n"
 
@@ -34,6 +36,22 @@ def noisy_messages(seed, count):
         )
         for i in range(count)
     ]
+
+
+def robot_bag(path):
+    """A rosbag2 folder with two seconds of the built-in robot."""
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    robot = BuiltInRobot("", 2.0, 1)
+    with Writer2(path, version=9) as writer:
+        connections = {
+            each.name: writer.add_connection(
+                each.name.replace("//", "/"), each.type, typestore=types
+            )
+            for each in robot.topics()
+        }
+        for message in robot.messages():
+            writer.write(connections[message.topic], message.time_ns, message.cdr)
+    return path
 
 
 def ros1_bag(path, compression, count):

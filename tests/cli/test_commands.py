@@ -11,10 +11,10 @@ import msgspec
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 
-from sdrlinkd.adapters import BuiltInRobot, empty, to_cdr
+from sdrlinkd.adapters import empty, to_cdr
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.reports import Snapshot
-from tests.adapters.recordings import ros2_bag
+from tests.adapters.recordings import robot_bag, ros2_bag
 from tests.programs import sdrlinkctl
 from tests.sealing.vectors import VECTORS
 from tests.waiting import again_and_again, wait_for
@@ -223,20 +223,7 @@ def test_without_a_daemon(ctl, tmp_path, arguments, recorded):
 @pytest.fixture
 def recorded(tmp_path_factory):
     """A rosbag2 folder with two seconds of the built-in robot."""
-    from rosbags.rosbag2 import Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    types = get_typestore(Stores.ROS2_HUMBLE)
-    path = tmp_path_factory.mktemp("bag") / "robot"
-    robot = BuiltInRobot("", 2.0, 1)
-    with Writer(path, version=9) as writer:
-        connections = {
-            t.name: writer.add_connection(t.name.replace("//", "/"), t.type, typestore=types)
-            for t in robot.topics()
-        }
-        for message in robot.messages():
-            writer.write(connections[message.topic], message.time_ns, message.cdr)
-    return path
+    return robot_bag(tmp_path_factory.mktemp("bag") / "robot")
 
 
 def test_bag_play_and_info(start_daemon, ctl, recorded):
