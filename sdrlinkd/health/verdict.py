@@ -120,6 +120,9 @@ def _robots(snapshot: Snapshot, shares_air: bool, *, is_starved: bool) -> list[s
     reasons = []
     if not robots and shares_air:
         return ["no robot heard yet: compare frequency, rate and grid at both robots, and antennas"]
+    if len(robots) > 1 and all(map(is_silent, robots)):
+        # That all fall silent at once has one cause, which is here.
+        return [_nobody(robots)]
     for robot in robots:
         if is_silent(robot):
             if robot.last_heard_s_ago < GONE_S:
@@ -128,9 +131,13 @@ def _robots(snapshot: Snapshot, shares_air: bool, *, is_starved: bool) -> list[s
             continue
         reasons += _quality(robot, is_starved=is_starved)
     if robots and all(each.last_heard_s_ago >= GONE_S for each in robots):
-        last_s = min(each.last_heard_s_ago for each in robots)
-        reasons.append(f"no robot heard for {span(last_s)}: check antenna, cable and frequency")
+        reasons.append(_nobody(robots))
     return reasons
+
+
+def _nobody(robots: list[NeighborReport]) -> str:
+    last_s = min(each.last_heard_s_ago for each in robots)
+    return f"no robot heard for {span(last_s)}: check antenna, cable and frequency"
 
 
 def _quality(robot: NeighborReport, *, is_starved: bool) -> list[str]:

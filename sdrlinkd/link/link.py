@@ -443,6 +443,8 @@ class Link:
     def want(self, wanted: Collection[tuple[int, int]]) -> None:
         """Tell other robots that consumers here subscribe to these topics, as (source, number)."""
         self._wants.set(wanted)
+        own = [number for src, number in wanted if src == self.own_id]
+        self._demand.want_own(self.own_id, own)
 
     def demand(self, now: float) -> dict[str, list[int]]:
         """The declared topics that other robots want at `now`, and which robots, by name."""

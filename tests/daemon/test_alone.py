@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from sdrlinkd import __main__ as program
-from sdrlinkd.client import Publisher, Subscriber
+from sdrlinkd.client import ControlClient, Publisher, Subscriber
 from sdrlinkd.process import Process, module
 from tests.waiting import wait_for
 
@@ -34,7 +34,7 @@ def test_it_hears_what_it_sends_and_says_how_it_came_to_be(tmp_path):
     environment.pop("INVOCATION_ID", None)
     command = [module("sdrlinkd")[0], "-c", run]
     with Process(command, environment=environment, log=tmp_path / "log") as daemon:
-        wait_for(lambda: "the radio is up" in daemon.log())
+        wait_for(lambda: "the loopback is up" in daemon.log())
         assert "without a configuration: robot 1 alone, which hears itself" in daemon.log()
         with (
             Subscriber("/rx_robot_1/*", runtime_dir=tmp_path) as heard,
@@ -43,5 +43,9 @@ def test_it_hears_what_it_sends_and_says_how_it_came_to_be(tmp_path):
             out.send("/robot_1/odom", CDR)
             message = heard.receive(20)
         assert (message.topic, message.payload) == ("/rx_robot_1/odom", CDR)
+        with ControlClient(tmp_path) as control, Subscriber("/rx_robot_1/a", runtime_dir=tmp_path):
+            # What consumers here want of this robot itself is demand, as a ROS bridge needs.
+            control.ask("declare", {"name": "/robot_1/a", "type": "std_msgs/msg/String"})
+            wait_for(lambda: control.ask("demand", {})["wanted"] == {"/robot_1/a": [1]})
         daemon.send_signal(signal.SIGTERM)
         assert daemon.wait() == 0

@@ -80,6 +80,8 @@ def test_a_moment_without_samples_is_no_outage():
         # Its usual pause is as long: half duplex.
         ([robot(last_heard_s_ago=30.0, usual_gap_s=15.0)], []),
         ([robot(last_heard_s_ago=50.0, usual_gap_s=15.0)], ["robot 2 not heard for 50 s"]),
+        # Of several, each by itself.
+        ([robot(last_heard_s_ago=6.0), robot(3, last_heard_s_ago=7.0)], ["no robot heard for 6 s"]),
         # The robot has left.
         ([robot(last_heard_s_ago=700.0), robot(3)], []),
         ([robot(last_heard_s_ago=7200.0)], ["no robot heard for 2 h 0 min"]),
