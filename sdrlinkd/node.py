@@ -77,7 +77,7 @@ class Node:
         self._started_at, self._loop_lag_s = time.monotonic(), 0.0
         self._draining = False
         self.bus = open_bus(self)
-        self._wanting = Wanting(setup, link, self.bus)
+        self.wanting = Wanting(setup, link, self.bus)
         self._air = AirWatch(self.bus, lambda: self._pdu_link)
 
     @property
@@ -159,7 +159,7 @@ class Node:
                 if (gathered := transforms.flush(now)) is not None:
                     self._link.submit(topic_id, gathered, now)
                     self._pdu_link.wake()
-            self._wanting.look()
+            self.wanting.look(now)
             self._air.look()
             if self._keeping is not None:
                 self._keeping.look(now, at_once=self._is_lockstep)

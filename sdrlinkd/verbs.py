@@ -90,6 +90,10 @@ def make_verbs(
             declaring.undeclare, "let another type have the name of a topic that was declared"
         ),
         "declared": Verb(lambda _: declaring.declared(), "topics that other robots declared"),
+        "rate": Verb(
+            lambda arguments: node.wanting.ask(arguments, opening.pdu_link.now()),
+            "ask another robot for fewer messages of a topic, for 5 s",
+        ),
         "demand": Verb(
             lambda arguments: declaring.demand(opening.pdu_link.now(), arguments),
             "own topics that consumers at other robots subscribe to",

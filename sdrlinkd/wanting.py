@@ -1,8 +1,17 @@
 """Finds out which topics of other robots consumers here subscribe to."""
 
-from sdrlinkd.bus import Bus
+from math import inf
+from typing import Any
+
+from sdrlinkd.bus import Bus, shown
 from sdrlinkd.config import Setup
+from sdrlinkd.errors import UserError
 from sdrlinkd.link import Link
+
+LEASE_S = 5.0
+"""Time in s for which a rate that a consumer asks for holds."""
+MOST_HZ = 1000.0
+MOST_ASKED = 1000
 
 
 class Wanting:
@@ -12,30 +21,56 @@ class Wanting:
         self._setup = setup
         self._link = link
         self._bus = bus
-        self._seen: tuple[int, frozenset[bytes]] = (0, frozenset())
+        self._seen: tuple[int, frozenset[bytes], frozenset[tuple[bytes, float]]] = (
+            0, frozenset(), frozenset(),
+        )  # fmt: skip
+        self._asked: dict[tuple[bytes, float], float] = {}
+        """Until when a consumer asks for messages of a topic frame in such a period."""
         self._frames: dict[int, tuple[int, list[tuple[bytes, int]]]] = {}
         """By robot: the version of what it declares, and the frame and number of each topic."""
 
-    def look(self) -> None:
-        """Tell the link, if subscriptions or declarations have changed since the last call."""
-        seen = self._link.heard_version, self._bus.filters
+    def ask(self, arguments: dict[str, Any], now: float) -> dict[str, Any]:
+        """Note that a message in so many a second of a topic is enough for a consumer here.
+
+        The fastest of several counts, for LEASE_S each. Raises UserError.
+        """
+        topic, hz = str(arguments.get("topic", "")), arguments.get("hz")
+        if not topic.startswith("/"):
+            raise UserError(f"topic: got {shown(topic)!r}; allowed: a topic of another robot")
+        if not isinstance(hz, int | float) or not 0 < hz <= MOST_HZ:
+            raise UserError(f"hz: got {shown(str(hz))}; allowed: above 0, up to {MOST_HZ:g}")
+        if len(self._asked) >= MOST_ASKED:
+            raise UserError(f"rates: got one more; allowed: {MOST_ASKED} at a time")
+        self._asked[topic.encode() + b"\0", 1 / hz] = now + LEASE_S
+        return {"topic": topic, "hz": hz, "lease_s": LEASE_S}
+
+    def look(self, now: float) -> None:
+        """Tell the link, if what is wanted, or declarations, have changed since the last call."""
+        # The link's clock may begin anew.
+        self._asked = {
+            key: until for key, until in self._asked.items() if now < until <= now + LEASE_S
+        }
+        seen = self._link.heard_version, self._bus.filters, frozenset(self._asked)
         if seen == self._seen:
             return
         self._seen = seen
+        enough_s: dict[bytes, float] = {}
+        for frame, period_s in self._asked:
+            enough_s[frame] = min(period_s, enough_s.get(frame, inf))
         filters = tuple(self._bus.filters)
         # What others declare must not cost more with each change.
         self._frames = {
             src: self._frames_of(src, version)
             for src, version in self._link.heard_versions().items()
         }
-        self._link.want(
-            [
-                (src, number)
-                for src, (_, frames) in self._frames.items()
-                for frame, number in frames
-                if frame.startswith(filters)
-            ]
-        )
+        wanted = {
+            (src, number): frame
+            for src, (_, frames) in self._frames.items()
+            for frame, number in frames
+            if frame.startswith(filters)
+        }
+        periods_s = {key: enough_s[frame] for key, frame in wanted.items() if frame in enough_s}
+        self._link.want(wanted, periods_s)
 
     def _frames_of(self, src: int, version: int) -> tuple[int, list[tuple[bytes, int]]]:
         known = self._frames.get(src)

@@ -226,7 +226,10 @@ def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None, hub: s
     configs = [out / name for name in files if name.endswith(".toml") and name != KEYS]
     is_real = preset is not None and preset.is_real
     is_here = len(configs) > 1 and not is_real and not hub
-    lines = ["next:", f"  sdrlinkd --check --config {configs[0]}"]
+    lines, here = ["next:"], configs[: None if is_here else 1]
+    if KEYS in files:
+        lines += [f"  sdrlinkctl key install --new --config {each}" for each in here]
+    lines.append(f"  sdrlinkd --check --config {configs[0]}")
     if is_real:
         lines += [
             f"  sdrlinkctl doctor --config {configs[0]}",
@@ -235,9 +238,6 @@ def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None, hub: s
     if preset is not None and preset.backend == "ether":
         where = f"--listen 0.0.0.0:{hub.rpartition(':')[2]}" if hub else f"--dir {out / 'air'}"
         lines.append(f"  sdrlink-ether {where} &")
-    here = configs[: None if is_here else 1]
-    if KEYS in files:
-        lines += [f"  sdrlinkctl key install --new --config {each}" for each in here]
     behind = " &" if is_here else ""
     lines += [f"  sdrlinkd --config {each}{behind}" for each in here]
     if len(configs) > 1 and not is_here:

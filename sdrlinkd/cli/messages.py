@@ -1,8 +1,10 @@
 """`pub` and `echo`: publish and show single messages, like `ros2 topic`."""
 
 import contextlib
+import threading
 import time
 from collections import Counter
+from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,13 +20,17 @@ from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.completion import heard_names, one_of, robot_names, topic_names
 from sdrlinkd.cli.names import refuse_own, topic_sent
-from sdrlinkd.client import QOS, Message, Publisher, Subscriber
+from sdrlinkd.client import QOS, Message, NoDaemonError, Publisher, RefusedError, Subscriber
 from sdrlinkd.errors import CdrError, UserError
 from sdrlinkd.link import CDR_HEADER_SIZE
 from sdrlinkd.units import seconds
 from sdrlinkd.wire import BROADCAST
 
 MAX_SHOWN_ITEMS = 12
+
+
+RENEW_S = 2.0
+"""A rate that is asked for holds for 5 s."""
 
 
 @app.command()
@@ -169,6 +175,10 @@ def echo(
         float | None,
         typer.Option(min=0, max=1e6, help="Stop after this many seconds without a message."),
     ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(min=0.001, max=1000, help="Ask the sender for so many a second at most."),
+    ] = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
     """Show messages received from other robots."""
@@ -176,7 +186,12 @@ def echo(
     shown = 0
     with connect(runtime_dir) as control:
         refuse_own(topic, ask_status(control), str(control.ask("config")["rx_format"]))
-    with Subscriber(topic, runtime_dir=runtime_dir) as subscriber:
+    with (
+        Subscriber(topic, runtime_dir=runtime_dir) as subscriber,
+        contextlib.ExitStack() as stack,
+    ):
+        if rate is not None:
+            stack.enter_context(_asking(topic, rate, runtime_dir))
         while message := subscriber.receive(timeout):
             _print(console, _headline(message), style="bold")
             _print(console, message.payload.hex(" ") if raw else as_yaml(message).rstrip("\n"))
@@ -188,6 +203,27 @@ def echo(
         raise UserError(
             f"{topic}: {shown} messages before --timeout; `sdrlinkctl topics` lists received topics"
         )
+
+
+@contextlib.contextmanager
+def _asking(topic: str, hz: float, runtime_dir: Path | None) -> Iterator[None]:
+    """Ask for fewer messages of a topic, again and again. Raises RefusedError."""
+    over = threading.Event()
+
+    def ask() -> None:
+        with contextlib.suppress(NoDaemonError, RefusedError), connect(runtime_dir) as control:
+            while not over.wait(RENEW_S):
+                control.ask("rate", {"topic": topic, "hz": hz})
+
+    with connect(runtime_dir) as control:
+        control.ask("rate", {"topic": topic, "hz": hz})
+    asking = threading.Thread(target=ask, daemon=True)
+    asking.start()
+    try:
+        yield
+    finally:
+        over.set()
+        asking.join()
 
 
 def _print(console: Console, text: str, style: str | None = None) -> None:

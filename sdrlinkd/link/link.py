@@ -47,6 +47,7 @@ from sdrlinkd.link.schedule import AdmissionParams, ClassesParams, Flow, Forecas
 from sdrlinkd.link.status import AirUse, Told, Why, reserved_words
 from sdrlinkd.link.timesync import ClockParams, Clocks, Estimate, State, Wall
 from sdrlinkd.link.topics import (
+    NOTHING,
     Demand,
     HeardTopic,
     HeardTopics,
@@ -83,6 +84,7 @@ from sdrlinkd.wire import (
     Flows,
     Lsa,
     Need,
+    RatesAsked,
     Receipt,
     Registry,
     Repeat,
@@ -440,9 +442,16 @@ class Link:
         """Counts the changes of what other robots declare."""
         return self._heard_topics.version
 
-    def want(self, wanted: Collection[tuple[int, int]]) -> None:
-        """Tell other robots that consumers here subscribe to these topics, as (source, number)."""
-        self._wants.set(wanted)
+    def want(
+        self,
+        wanted: Collection[tuple[int, int]],
+        periods_s: Mapping[tuple[int, int], float] = NOTHING,
+    ) -> None:
+        """Tell other robots that consumers here subscribe to these topics, as (source, number).
+
+        Of those in `periods_s`, a message in each period of so many s is enough.
+        """
+        self._wants.set(wanted, periods_s)
         own = [number for src, number in wanted if src == self.own_id]
         self._demand.want_own(self.own_id, own)
 
@@ -513,6 +522,7 @@ class Link:
         """Run all timers up to `now`: expiries, reassembly timeouts, rate samples."""
         scheduler = self._scheduler
         self._composer.expire(now)
+        self._intake.suffice(self._demand.periods(now))
         for offer in self._latched.due(now, scheduler.bytes_per_s):
             self._intake.offer_again(offer, now, scheduler.bytes_per_s)
             scheduler.more_to_send()
@@ -637,6 +647,8 @@ class Link:
             self._reception.take_waits(src, record)
         elif isinstance(record, Wanted):
             self._demand.hear(src, record, at)
+        elif isinstance(record, RatesAsked):
+            self._demand.hear_rates(src, record, at)
         elif isinstance(record, Repeat):
             if src != self.own_id and record.node == src and can_be_true(record):
                 self._answers.others_repeat(record, self._scheduler.record_pdu_s, at)

@@ -110,6 +110,7 @@ from sdrlinkd.wire.later import (
 from sdrlinkd.wire.origin import TopicOrigin, name_for, read_origin
 from sdrlinkd.wire.partials import Lost, Partial, ReassemblyLimits
 from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse, source_and_class
+from sdrlinkd.wire.rates import RatesAsked, period_code, period_s
 from sdrlinkd.wire.readable import ControlEntries, numbered, read_control_entries, with_topic
 from sdrlinkd.wire.reassembly import Reassembly
 from sdrlinkd.wire.record_types import (
@@ -300,6 +301,7 @@ __all__ = [
     "Partial",
     "Pdu",
     "PduBuilder",
+    "RatesAsked",
     "Reassembly",
     "ReassemblyLimits",
     "Receipt",
@@ -361,6 +363,8 @@ __all__ = [
     "parse_registry",
     "parse_sealed",
     "part_size",
+    "period_code",
+    "period_s",
     "pieces",
     "postponed",
     "read_control_entries",

@@ -36,6 +36,7 @@ from sdrlinkd.wire.granting import (
     parse_grant,
     parse_want,
 )
+from sdrlinkd.wire.rates import RATE_OVERHEAD, RatesAsked, build_rates, parse_rates
 from sdrlinkd.wire.record_types import (
     NO_AGE,
     Beacon,
@@ -115,6 +116,7 @@ Record = (
     | Admit
     | LostNumbers
     | FoundNumbers
+    | RatesAsked
 )
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
@@ -169,6 +171,7 @@ _LEAST = {
     int(RecordType.ADMIT): ADMIT_OVERHEAD - TLV_HEADER_SIZE,
     int(RecordType.LOST): LOST_SIZE,
     int(RecordType.FOUND): FOUND_SIZE,
+    int(RecordType.RATE): RATE_OVERHEAD,
 }
 
 
@@ -193,6 +196,7 @@ _READERS: dict[int, Callable[[bytes], Record]] = {
     RecordType.ADMIT: parse_admit,
     RecordType.LOST: parse_lost,
     RecordType.FOUND: parse_found,
+    RecordType.RATE: parse_rates,
 }
 """Readers of the values of records without fixed fields, by type number."""
 
@@ -282,6 +286,7 @@ _BUILDERS: dict[type[Record], tuple[RecordType, Callable[[Any], bytes]]] = {
     Admit: (RecordType.ADMIT, build_admit),
     LostNumbers: (RecordType.LOST, build_lost),
     FoundNumbers: (RecordType.FOUND, build_found),
+    RatesAsked: (RecordType.RATE, build_rates),
 }
 
 

@@ -35,6 +35,7 @@ class RecordType(IntEnum):
     ADMIT = 23
     LOST = 27
     FOUND = 28
+    RATE = 29
 
 
 class Stamp(NamedTuple):

@@ -1,6 +1,7 @@
 """Topics that producers declare at real daemons, and messages too large for 255 fragments."""
 
 import struct
+import time
 from random import Random
 
 import pytest
@@ -143,6 +144,44 @@ def test_once_its_producers_have_ended_another_type_may_have_the_name(start_daem
         declare(daemon, "/robot_1/chg")
     with pytest.raises(RefusedError, match="allowed: a declared topic"):
         ask(daemon, "undeclare", name="/robot_1/none")
+
+
+def test_consumers_get_no_more_than_they_ask_for(start_daemon, tmp_path_factory):
+    """And every message again, once nobody asks any more, or somebody wants them all."""
+    hub = tmp_path_factory.mktemp("hub")
+    with serving(hub, **AIR):
+        one, two = (start_daemon(on_ether(hub, robot)) for robot in (1, 2))
+        declare(one, "/robot_1/a")
+        with (
+            Subscriber("/rx_robot_1/a", directory=two.directory, depth=0) as heard,
+            Publisher(one.directory) as out,
+        ):
+            wait_for(lambda: ask(one, "demand")["wanted"] == {"/robot_1/a": [2]}, 60)
+
+            def throttled():
+                (topic,) = one.snapshot().link.topics
+                return topic.dropped.get("tx_throttled", 0)
+
+            def send(n):
+                before = throttled()
+                for _ in range(n):
+                    out.send("/robot_1/a", b"\0\1\0\0\1\0\0\0\0")
+                    time.sleep(0.01)
+                out.flush(20)
+                return throttled() - before
+
+            assert send(20) == 0
+            told = ask(two, "rate", topic="/rx_robot_1/a", hz=2)
+            assert told == {"topic": "/rx_robot_1/a", "hz": 2, "lease_s": 5.0}
+            wait_for(lambda: send(10) >= 9, 60)
+            words = " ".join(ask(one, "why", topic="a")["why"])
+            assert "throttled to 2 Hz, which the robots that want it ask for" in words
+            # The way back: the lease ends.
+            wait_for(lambda: send(10) == 0, 60)
+            assert heard.receive(20) is not None
+        for wrong in (0, -1, 1e9, "two", None):
+            with pytest.raises(RefusedError, match="hz: got"):
+                ask(two, "rate", topic="/rx_robot_1/a", hz=wrong)
 
 
 @pytest.mark.parametrize(

@@ -235,7 +235,7 @@ def test_a_driver_that_is_not_installed_is_for_a_person_to_mend(write_config, tm
         assert daemon.wait() == 2, daemon.err()
     last = daemon.err().splitlines()[-1]
     assert 'no driver "hackrff"' in last
-    assert "libloopbackSupport.so" in last
+    assert "its drivers: loopback" in last
     assert "Traceback" not in daemon.err()
 
 

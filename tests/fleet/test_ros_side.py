@@ -379,7 +379,8 @@ async def requests(daemon, n):
         return [each for each in packets if each[1].kind == Kind.REQUEST]
 
     await until(lambda: len({each[1].number for each in found()}) >= n)
-    return list({each[1].number: each for each in found()}.values())
+    first = {each[1].number: each for each in reversed(found())}
+    return [first[number] for number in sorted(first)]
 
 
 async def test_a_call_is_made_over_the_daemon_and_its_answer_comes_back(daemon, calling):

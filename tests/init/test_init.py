@@ -341,10 +341,10 @@ def test_a_sealed_team_gets_a_key(init, tmp_path, capsys, monkeypatch):
     assert (code, err) == (0, "")
     keys, config = tmp_path / "team" / "keys.toml", tmp_path / "team" / "robot_1.toml"
     assert keys.stat().st_mode & 0o777 == 0o600
-    assert "PDUs are sealed: only the team's key sends" in checked(config, capsys)
     assert f"sdrlinkctl key install --new --config {config}" in said
     assert run(["key", "install", "--new", "--config", str(config)]) == 0
     assert "installed: key 0, made " in capsys.readouterr().out
+    assert "PDUs are sealed: only the team's key sends" in checked(config, capsys)
 
 
 def test_a_real_radio_is_told_to_carry_the_key_along(init, tmp_path, capsys):

@@ -191,6 +191,42 @@ def test_types_of_every_shape_arrive_equal(start_daemon, start, hub):
         assert two.node.got(topic=f"/robot_1{topic}") == sent, kind
 
 
+def test_a_subscriber_gets_no_more_than_it_asks_for(start_daemon, start, hub):
+    one = Robot(start, start_daemon(config(hub, 1))).bridged()
+    two = Robot(start, start_daemon(config(hub, 2)), "-p", 'rates:=["/robot_1/od*:=5"]').bridged()
+    one.node.pub(topic="/odom", type=ODOM[1])
+    two.node.sub(topic="/robot_1/odom", type=ODOM[1])
+    matched(one, "/odom")
+
+    def throttled():
+        topics = one.daemon.snapshot().link.topics
+        return sum(each.dropped.get("tx_throttled", 0) for each in topics)
+
+    def is_slowed():
+        one.node.send(topic="/odom", n=10)
+        return throttled() >= 20
+
+    wait_for(is_slowed, WAIT_S)
+    before, heard = throttled(), two.node.count(topic="/robot_1/odom")
+    one.node.send(topic="/odom", n=150, hz=50)
+    one.node.sent()
+    wait_for(lambda: two.node.count(topic="/robot_1/odom") >= heard + 10, WAIT_S)
+    assert throttled() - before >= 100
+    assert two.node.set(node="sdrlink_bridge", name="rates", value=["/robot_1/odom:=fast"]) == [
+        False,
+        "rates: got ['/robot_1/odom:=fast']; allowed: a list of NAME:=HZ, such as /robot_2/scan:=2",
+    ]
+    # The way back.
+    assert two.node.set(node="sdrlink_bridge", name="rates", value=["/none:=5"])[0]
+
+    def is_whole():
+        before = throttled()
+        one.node.send(topic="/odom", n=10)
+        return throttled() == before
+
+    wait_for(is_whole, WAIT_S)
+
+
 def test_a_busy_daemon_is_not_said_to_be_away(start_daemon, start, hub):
     """It is stopped for two seconds; what nodes publish meanwhile arrives."""
     one = Robot(start, start_daemon(config(hub, 1))).bridged()

@@ -28,6 +28,7 @@ from sdrlinkd.wire import (
     Met,
     Need,
     Parity,
+    RatesAsked,
     Receipt,
     RegistryDigest,
     Repeat,
@@ -40,6 +41,8 @@ from sdrlinkd.wire import (
     Wanted,
     build_records,
     parse_records,
+    period_code,
+    period_s,
     tellable,
 )
 from tests.laws import law, trials
@@ -74,6 +77,7 @@ NEED = {
     23: 5,
     27: 13,
     28: 17,
+    29: 1,
 }
 
 octet = st.integers(0, 255)
@@ -112,6 +116,7 @@ records = st.one_of(
         st.integers(0, (1 << 30) - 1),
         st.none() | st.integers(0, (1 << 32) - 2),
     ),
+    st.builds(RatesAsked, octet, st.lists(st.tuples(octet, octet), max_size=127).map(tuple)),
     st.builds(
         Clock,
         u16,
@@ -387,6 +392,9 @@ def test_any_bytes_are_records_or_refused():
         LostNumbers(4, bytes(4), bytes(8)),
         LostNumbers(0, bytes(3), bytes(8)),
         LostNumbers(0, bytes(4), bytes(7)),
+        RatesAsked(256, ()),
+        RatesAsked(0, ((256, 0),)),
+        RatesAsked(0, ((0, 0),) * 128),
         FoundNumbers(256, bytes(8), 0, 0, None),
         FoundNumbers(0, bytes(9), 0, 0, None),
         FoundNumbers(0, bytes(8), 4, 0, None),
@@ -428,6 +436,21 @@ def refused(payload):
 def test_digest_of_another_length(size):
     with pytest.raises(ValueError, match="digest"):
         build_records([RegistryDigest(bytes(size), b"")])
+
+
+def test_periods_are_told_in_eighths_of_an_octave():
+    """By the table of the wire document: 80 is 1 s, and 8 more are twice as long."""
+    for seconds, code in ((1.0, 80), (2.0, 88), (0.5, 72), (0.1, 53), (1e-6, 0), (1e9, 255)):
+        assert period_code(seconds) == code
+    for code in range(256):
+        assert period_code(period_s(code)) == code
+        assert period_code(1.05 * period_s(code)) == code
+    for wrong in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match="a period of"):
+            period_code(wrong)
+    record = RatesAsked(2, ((16, 72), (17, 80)))
+    assert build_records([record]) == bytes.fromhex("1d05 02 1048 1150")
+    assert parse_records(bytes.fromhex("1d06 02 1048 1150 ff")) == [record]
 
 
 def test_golden_records_about_lost_numbers():

@@ -11,7 +11,7 @@ from typing import Any
 from sdrlink_ros import graph, qos
 from sdrlink_ros.echoes import Echoes
 from sdrlink_ros.kinds import UnknownTypeError, kind
-from sdrlink_ros.names import Names, command_for, is_command, matches
+from sdrlink_ros.names import Names, command_for, is_command, matches, rate_of
 from sdrlink_ros.outlet import LINGER_S, Outlet, Source, restamped
 from sdrlink_ros.sayings import Sayings
 from sdrlink_ros.settings import Settings
@@ -90,6 +90,16 @@ class Incoming:
     def wanted(self) -> frozenset[str]:
         """The bus topics that somebody here subscribes to."""
         return self._wanted
+
+    def rates(self, settings: Settings) -> dict[str, float]:
+        """How often messages of wanted topics are enough here, in Hz by bus topic."""
+        found = {}
+        for bus in self._wanted:
+            outlet = self._outlets.get(bus)
+            hz = None if outlet is None else rate_of(outlet.names, settings.rates)
+            if hz is not None:
+                found[bus] = hz
+        return found
 
     def heard(self) -> set[tuple[int, str]]:
         """(robot, name) of the topics that other robots declare."""

@@ -12,6 +12,7 @@ LARGE = ("sensor_msgs/msg/Image", "sensor_msgs/msg/PointCloud2")
 """Types that would fill a radio link."""
 EVERYTHING = ("*", "/*")
 MOST_NEAR = 3
+MOST_HZ = 1000.0
 
 
 def matches(name: str, patterns: Iterable[str]) -> bool:
@@ -105,3 +106,21 @@ def command_for(own: int, name: str) -> str | None:
 def is_command(name: str) -> bool:
     """Whether a name on the air is that of a command to some robot."""
     return re.match(r"robot_\d{1,3}/", name) is not None
+
+
+def is_rate(text: str) -> bool:
+    """Whether a text is a pattern and a rate in Hz, as in `/robot_2/scan:=2`."""
+    pattern, _, hz = text.partition(":=")
+    try:
+        return bool(pattern) and 0 < float(hz) <= MOST_HZ
+    except ValueError:
+        return False
+
+
+def rate_of(names: "tuple[str, ...]", rates: "tuple[str, ...]") -> "float | None":
+    """How often messages of a topic with these names are enough here, in Hz; None: always."""
+    for text in rates:
+        pattern, _, hz = text.partition(":=")
+        if any(matches(name, (pattern,)) for name in names):
+            return float(hz)
+    return None

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 
+from sdrlink_ros.names import is_rate
 from sdrlink_ros.settings import Settings
 
 
@@ -25,6 +26,8 @@ _PARAMETERS = (
                f"other way. {_PATTERNS}"),
     _Parameter("eager", "eager", "Topics that are sent even if nobody is known to subscribe to "
                f"them. {_PATTERNS}"),
+    _Parameter("rates", "rates", "How often a message a second of others' topics is enough here, "
+               "as in /robot_2/scan:=2 or *:=10; the first that fits counts."),
     _Parameter("restamp", "restamp", "Topics of others, by their names here or at their robot, "
                f"whose header gets the time of publication by this host's clock. {_PATTERNS}"),
     _Parameter("rx_format", "rx_format", "Prefix of others' topics, with {src} for the robot's id.",
@@ -82,6 +85,8 @@ class Parameters:
             fitting = float(value) if is_in else None
         else:
             allowed = "true or false" if isinstance(default, bool) else "a text"
+        if parameter.field == "rates" and fitting and not all(map(is_rate, fitting)):
+            fitting, allowed = None, "a list of NAME:=HZ, such as /robot_2/scan:=2"
         if not isinstance(fitting, type(default)):
             raise ValueError(  # noqa: TRY004
                 f"{parameter.name}: got {value!r}; allowed: {allowed}"

@@ -12,6 +12,7 @@ class Settings(NamedTuple):
     deny: tuple[str, ...] = ()
     commands: tuple[str, ...] = COMMANDS
     eager: tuple[str, ...] = ()
+    rates: tuple[str, ...] = ()
     restamp: tuple[str, ...] = ()
     rx_format: str = "/robot_{src}"
     tf_merge: bool = False

@@ -22,7 +22,7 @@ LASTING = frozenset(
     {
         RecordType.CLOCK, RecordType.RECEIPT, RecordType.TOPIC, RecordType.WANTED,
         RecordType.CONTACT, RecordType.NEED, RecordType.ROUTE, RecordType.LSA,
-        RecordType.FLOWS, RecordType.ADMIT, RecordType.FOUND,
+        RecordType.FLOWS, RecordType.ADMIT, RecordType.FOUND, RecordType.RATE,
     }
 )  # fmt: skip
 """Record types that a new beacon does not replace."""

@@ -11,13 +11,15 @@ NOT_TAKEN = frozenset({
 class Admission:
     """Admission control of one topic: size cap, throttle, decimation and change detection."""
 
-    __slots__ = ("_due_at", "_last", "_number", "_policy")
+    __slots__ = ("_due_at", "_last", "_number", "_policy", "enough_s")
 
     def __init__(self, policy: TopicPolicy) -> None:
         self._policy = policy
         self._due_at = float("-inf")
         self._number = 0
         self._last: bytes | None = None
+        self.enough_s = 0.0
+        """Period in s that suffices all consumers; 0: they want every message."""
 
     def refuse(self, payload: bytes, now: float) -> str | None:
         """The ledger's reason for refusing a message; None: it is admitted and remembered."""
@@ -30,12 +32,12 @@ class Admission:
             self._number += 1
             if self._number % policy.decimate != 1:
                 return "tx_decimated"
-        if policy.period_s:
+        if period_s := max(policy.period_s, 0.0 if policy.latched else self.enough_s):
             if now < self._due_at:
                 return "tx_throttled"
             # A grid keeps the period on average even if it is no multiple of the producer's.
             late_s = now - self._due_at
-            self._due_at = now + policy.period_s - (late_s if late_s < policy.period_s else 0.0)
+            self._due_at = now + period_s - (late_s if late_s < period_s else 0.0)
         if policy.on_change:
             self._last = payload
         return None

@@ -69,6 +69,8 @@ class Intake:
         self._topics: dict[int, TopicState] = {}
         for topic in topics:
             self.add(topic.id, dictionaries.get(topic.id))
+        self._slowed: set[int] = set()
+        """Topics of which consumers ask for fewer messages."""
         self._refused = TxTally()
         """Messages without a topic of ours: bad envelopes, unknown topics."""
         self._relayed = TxTally()
@@ -88,6 +90,24 @@ class Intake:
     def unused(self, topic_id: int) -> None:
         """Note that a topic's producers have ended; the next message says otherwise."""
         self._topics[topic_id].used_at = -inf
+
+    def suffice(self, periods_s: Mapping[str, float]) -> None:
+        """Send no more of each topic than its consumers ask for: a message a period, by name."""
+        if not periods_s and not self._slowed:
+            return
+        now = {
+            topic.id: period for name, period in periods_s.items()
+            if (topic := self._own.by_name(name)) is not None and topic.id in self._topics
+        }  # fmt: skip
+        for topic_id in self._slowed - now.keys():
+            self._topics[topic_id].admission.enough_s = 0.0
+        for topic_id, period_s in now.items():
+            self._topics[topic_id].admission.enough_s = period_s
+        self._slowed = set(now)
+
+    def enough_s(self, topic_id: int) -> float:
+        """Period in s of a topic's messages that suffices all consumers; 0: they want them all."""
+        return self._topics[topic_id].admission.enough_s
 
     def is_idle(self, topic_id: int, now: float) -> bool:
         """Whether nobody has declared a topic or sent a message of it for IDLE_S."""

@@ -18,6 +18,7 @@ from sdrlinkd.wire import (
     LostNumbers,
     Parity,
     Pdu,
+    RatesAsked,
     Receipt,
     Record,
     RegistryDigest,
@@ -74,7 +75,7 @@ class HeardRecords:
             elif isinstance(record, Receipt):
                 if self._own_id in (pdu.dst, record.node):
                     events.append(RecordHeard(src, record, at))
-            elif isinstance(record, Wanted):
+            elif isinstance(record, Wanted | RatesAsked):
                 if record.node == self._own_id:
                     events.append(RecordHeard(src, record, at))
             elif not is_relayed:

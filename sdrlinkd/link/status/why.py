@@ -126,6 +126,9 @@ class Why:
 
     def _said(self, reason: str, topic_id: int, policy: TopicPolicy, told: Told) -> str:
         if reason == "tx_throttled":
+            enough_s = self._intake.enough_s(topic_id)
+            if enough_s > policy.period_s:
+                return f"throttled to {1 / enough_s:.3g} Hz, which the robots that want it ask for"
             if not policy.period_s:
                 return "throttled by a period that is no longer set"
             by = "sdrlinkctl set" if "period_s" in told.changed else told.source

@@ -15,7 +15,7 @@ from sdrlinkd.link.topics.heard import (
 )
 from sdrlinkd.link.topics.own import IDLE_S, MOST_KEYS, N_NUMBERS, Offer, OwnTopics
 from sdrlinkd.link.topics.telling import TELLING_SHARE, TopicTeller
-from sdrlinkd.link.topics.wants import Wants
+from sdrlinkd.link.topics.wants import NOTHING, Wants
 
 __all__ = [
     "FREE",
@@ -25,6 +25,7 @@ __all__ = [
     "MOST_OF_ALL",
     "MOST_OF_ONE",
     "MOST_TOLD",
+    "NOTHING",
     "N_NUMBERS",
     "TELLING_SHARE",
     "Demand",

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 
 from sdrlinkd.link.topics.own import OwnTopics
-from sdrlinkd.wire import Wanted
+from sdrlinkd.wire import RatesAsked, Wanted, period_s
 
 LEASE_S = 3.0
 """Time in s for which a WANTED record holds."""
@@ -16,6 +16,8 @@ class Demand:
         self._topics = topics
         self._until: dict[tuple[str, int], float] = {}
         """When the lease of a topic by a robot ends."""
+        self._periods: dict[tuple[str, int], tuple[float, float]] = {}
+        """The period that suffices a robot for a topic, and when its lease ends."""
         self._own: tuple[int, frozenset[int]] = (0, frozenset())
 
     def want_own(self, own_id: int, numbers: Collection[int]) -> None:
@@ -28,6 +30,28 @@ class Demand:
             about = self._topics.told.get(number)
             if about is not None:
                 self._until[about.name, src] = at + LEASE_S
+
+    def hear_rates(self, src: int, asked: RatesAsked, at: float) -> None:
+        """Take how often messages of topics of this robot suffice robot `src`."""
+        for number, code in asked.periods:
+            about = self._topics.told.get(number)
+            if about is not None:
+                self._periods[about.name, src] = period_s(code), at + LEASE_S
+
+    def periods(self, now: float) -> dict[str, float]:
+        """The period in s that suffices all who want a topic at `now`, by name.
+
+        Topics are missing of which somebody wants every message.
+        """
+        if not self._periods:
+            return {}
+        self._periods = {key: told for key, told in self._periods.items() if told[1] > now}
+        found: dict[str, float] = {}
+        for name, robots in self.wanted(now).items():
+            least = min(self._periods.get((name, src), (0.0, 0.0))[0] for src in robots)
+            if least:
+                found[name] = least
+        return found
 
     def wanted(self, now: float) -> dict[str, list[int]]:
         """The names of the topics that are wanted at `now`, and the robots that want each."""

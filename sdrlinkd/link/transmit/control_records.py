@@ -35,6 +35,7 @@ from sdrlinkd.wire import (
     Entry,
     Frame,
     Pdu,
+    RatesAsked,
     Receipt,
     Record,
     RecordType,
@@ -211,7 +212,10 @@ class ControlRecords:
         Declarations use spare room or, within their share of the air, PDUs of `pdu_s` of their own.
         """
         for wanted in self._wants.due(now, self._neighbors.present(now)):
-            key = (RecordType.WANTED, wanted.node, *wanted.topics[:1])
+            if isinstance(wanted, RatesAsked):
+                key = RecordType.RATE, wanted.node, *wanted.periods[0][:1]
+            else:
+                key = RecordType.WANTED, wanted.node, *wanted.topics[:1]
             self._piggyback.put_as(key, wanted, self._alone_from(now + PATIENCE_S))
         self._offer_contact(now)
         self._offer_found(now, pdu_s)
