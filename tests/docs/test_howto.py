@@ -2,13 +2,14 @@
 
 import contextlib
 import re
+import subprocess
 
 import pytest
 
-from sdrlinkd.client import ControlClient, NoDaemonError
+from sdrlinkd.client import ControlClient, NoDaemonError, Subscriber
 from sdrlinkd.manual import find_how_to, how_tos
 from sdrlinkd.process import wait_until
-from tests.docs.pages import ROOT, commands_of
+from tests.docs.pages import ROOT, File, commands_of, steps_of
 from tests.docs.reader import PATIENCE_S, Reader
 from tests.laws import one_in
 
@@ -66,3 +67,23 @@ def test_a_page_is_one_screen_and_listed(name):
 def test_all_pages_are_those_that_help_shows():
     assert [page.name for page in how_tos()] == NAMES
     assert find_how_to("late-joiners", []).title == "Let robots that come late get the map"
+
+
+@pytest.mark.slow
+def test_a_publisher_in_c_sends_as_printed(daemon, tmp_path):
+    source = next(
+        each.text
+        for each in steps_of((FOLDER / "other-languages.md").read_text())
+        if isinstance(each, File) and each.name == "send.c"
+    )
+    (tmp_path / "send.c").write_text(source)
+    subprocess.run(
+        ["cc", "-Wall", "-Werror", "send.c", "-lzmq", "-o", "send"], cwd=tmp_path, check=True
+    )
+    with Subscriber("/rx_robot_1/cmd_vel", directory=daemon.directory) as heard:
+        subprocess.run(
+            [tmp_path / "send"], check=True, timeout=60,
+            env={"SDRLINKD_RUNTIME_DIR": str(daemon.directory)},
+        )  # fmt: skip
+        message = heard.receive(20)
+    assert (message.topic, message.payload) == ("/rx_robot_1/cmd_vel", b"\0\1" + bytes(50))
