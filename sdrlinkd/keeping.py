@@ -37,8 +37,8 @@ class Keeping:
         self._aged_at = -inf
         if sealing.is_lost:
             log.warning(
-                "the numbers of the key are lost here: nothing is sealed before it is known which "
-                "ones were used"
+                "the numbers of the key are lost here, or it was never installed (then: sdrlinkctl "
+                "key install --new): nothing is sealed before it is known which ones were used"
             )
         wanted = sealing.memory.wanted(0.0)
         if wanted is None:

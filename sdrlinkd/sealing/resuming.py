@@ -137,7 +137,10 @@ class Resuming:
             return ""
         lost = f"the numbers of key {self._key.kid} are lost here"
         if now < self._until:
-            return f"{lost}: the other robots are asked for {ceil(self._until - now)} more seconds"
+            return (
+                f"{lost}, or it was never installed (then: sdrlinkctl key install --new); the other "
+                f"robots are asked for {ceil(self._until - now)} more seconds"
+            )
         who = "has heard this robot use it" if self.is_answered else "answers"
         return (
             f"{lost}, no robot {who}, and its age is not known. If this robot never used it: "
