@@ -92,6 +92,9 @@ class Declaring:
         topic = self._link.topic_named(self._setup.name_on_air(given))
         if topic is None or topic.id < FIRST_NUMBER:
             raise DeclarationError(f"name: got {shown(given)!r}; allowed: a declared topic")
+        kind = str(arguments.get("type", topic.type))
+        if topic_type(kind) != topic.type:
+            raise DeclarationError(f"{given}: got type {shown(kind)}; it is {topic.type} now")
         self._link.undeclare(topic.id)
         return {"topic": given, "type": topic.type}
 

@@ -12,8 +12,10 @@ from sdrlinkd.config import Config, Setup, located
 from sdrlinkd.errors import UserError
 from sdrlinkd.files import unwritable
 from sdrlinkd.keeping import key_state, usable
-from sdrlinkd.keyring import SYSTEM_CONFIG, load_keys
+from sdrlinkd.keyring import load_keys, service_name
 from sdrlinkd.pdulink import try_gnuradio
+
+SYSTEM_RUN = Path("/run")
 
 
 def try_start(setup: Setup, directory: Path) -> list[str]:
@@ -21,15 +23,19 @@ def try_start(setup: Setup, directory: Path) -> list[str]:
 
     A daemon that runs there now is no obstacle: it is stopped before another one starts.
     """
-    if setup.source and Path(setup.source).absolute().parent == SYSTEM_CONFIG and os.getuid():
+    service = service_name(Path(setup.source)) if setup.source else ""
+    if service and os.getuid():
         return ["not checked: the service's folders and keys, which root can see"]
+    if service and not setup.config.bus.runtime_dir:
+        directory = SYSTEM_RUN / service
     try:
         pid = running_in(directory)
         told = [f"a daemon runs in {directory}, process {pid}: ports were not tried"] if pid else []
-        if not pid:
+        if not (pid or service):
+            # The folder of a service is made by systemd.
             check_directory(directory)
         told += [f"warning: {warning}" for warning in unknown_types(setup)]
-        told += _check_keys(setup, is_running=bool(pid))
+        told += _check_keys(setup)
         _check_recordings(setup.config)
         if not pid:
             _check_ports(setup.config)
@@ -38,7 +44,7 @@ def try_start(setup: Setup, directory: Path) -> list[str]:
     return told
 
 
-def _check_keys(setup: Setup, *, is_running: bool) -> list[str]:
+def _check_keys(setup: Setup) -> list[str]:
     security = setup.config.security
     if security.mode == "off":
         return []
@@ -48,8 +54,6 @@ def _check_keys(setup: Setup, *, is_running: bool) -> list[str]:
             f"security.state_dir: {state.directory} cannot be used ({problem}); allowed: a "
             "directory that this user may write to, as numbers must survive a restart"
         )
-    if not is_running and state.is_held:
-        raise UserError(state.held)
     with _of("security.keys"):
         keys = load_keys(Path(security.keys))
     loaded = state.load(keys)

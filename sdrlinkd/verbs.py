@@ -95,7 +95,10 @@ def make_verbs(
             "ask another robot for fewer messages of a topic, for 5 s",
         ),
         "demand": Verb(
-            lambda arguments: declaring.demand(opening.pdu_link.now(), arguments),
+            lambda arguments: {
+                **declaring.demand(opening.pdu_link.now(), arguments),
+                "rated": node.wanting.rated,
+            },
             "own topics that consumers at other robots subscribe to",
         ),
         "why": Verb(why, "explain in plain words what happens to a topic"),

@@ -10,7 +10,7 @@ from sdrlinkd.link import Link
 
 LEASE_S = 5.0
 """Time in s for which a rate that a consumer asks for holds."""
-MOST_HZ = 1000.0
+LEAST_HZ, MOST_HZ = 0.02, 1000.0
 MOST_ASKED = 1000
 
 
@@ -30,19 +30,27 @@ class Wanting:
         """By robot: the version of what it declares, and the frame and number of each topic."""
 
     def ask(self, arguments: dict[str, Any], now: float) -> dict[str, Any]:
-        """Note that a message in so many a second of a topic is enough for a consumer here.
+        """Note that so many messages a second of a topic are enough for a consumer here; 0: all.
 
         The fastest of several counts, for LEASE_S each. Raises UserError.
         """
         topic, hz = str(arguments.get("topic", "")), arguments.get("hz")
         if not topic.startswith("/"):
             raise UserError(f"topic: got {shown(topic)!r}; allowed: a topic of another robot")
-        if not isinstance(hz, int | float) or not 0 < hz <= MOST_HZ:
-            raise UserError(f"hz: got {shown(str(hz))}; allowed: above 0, up to {MOST_HZ:g}")
-        if len(self._asked) >= MOST_ASKED:
+        if not isinstance(hz, int | float) or not (hz == 0 or LEAST_HZ <= hz <= MOST_HZ):
+            raise UserError(
+                f"hz: got {shown(str(hz))}; allowed: 0 (all), or from {LEAST_HZ:g} to {MOST_HZ:g}"
+            )
+        key = topic.encode() + b"\0", 1 / hz if hz else 0.0
+        if len(self._asked) >= MOST_ASKED and key not in self._asked:
             raise UserError(f"rates: got one more; allowed: {MOST_ASKED} at a time")
-        self._asked[topic.encode() + b"\0", 1 / hz] = now + LEASE_S
+        self._asked[key] = now + LEASE_S
         return {"topic": topic, "hz": hz, "lease_s": LEASE_S}
+
+    @property
+    def rated(self) -> list[str]:
+        """The topics of which somebody here asks for fewer messages."""
+        return sorted({frame[:-1].decode() for frame, period_s in self._asked if period_s})
 
     def look(self, now: float) -> None:
         """Tell the link, if what is wanted, or declarations, have changed since the last call."""
@@ -69,7 +77,7 @@ class Wanting:
             for frame, number in frames
             if frame.startswith(filters)
         }
-        periods_s = {key: enough_s[frame] for key, frame in wanted.items() if frame in enough_s}
+        periods_s = {key: enough_s[frame] for key, frame in wanted.items() if enough_s.get(frame)}
         self._link.want(wanted, periods_s)
 
     def _frames_of(self, src: int, version: int) -> tuple[int, list[tuple[bytes, int]]]:

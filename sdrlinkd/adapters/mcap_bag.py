@@ -1,19 +1,22 @@
 """MCAP files that rosbag2 has not written: ROS 1 messages, and the names of other encodings."""
 
+import os
 import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, NamedTuple
 
+import lz4.frame
 import zstandard
 from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.reader import McapReader, make_reader
-from mcap.records import Channel, ChunkIndex, Schema
+from mcap.records import Channel, Schema
 from mcap.summary import Summary
 from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import parse_qos
 
-from sdrlinkd.adapters.salvage.bounds import MOST_BYTES
+from sdrlinkd.adapters.salvage.bounds import MOST_BYTES, PIECE
 
 HEAD = b"\x89MCAP0\r\n\x01"
 """The magic, and the opcode of the header."""
@@ -23,6 +26,8 @@ PROFILE = "ros2"
 ZSTD_HEADER_BYTES = 18
 _CHUNK = struct.Struct("<BQQQQII")
 """Opcode, length, two times, size, CRC-32, and the length of the compression's name."""
+_RECORD = struct.Struct("<BQ")
+_LENGTH = struct.Struct("<Q")
 
 
 class McapChannel(NamedTuple):
@@ -87,8 +92,10 @@ class IndexedMcap:
         summary = _summary(self._stream)
         if summary is None or summary.statistics is None:
             raise McapError("no index")
+        if not summary.chunk_indexes and _has_chunk(self._stream):
+            raise McapError("no chunk is in the index")
         for index in summary.chunk_indexes:
-            _refuse_bomb(self._stream, index)
+            _refuse_bomb(self._stream, index.chunk_start_offset)
         counts = summary.statistics.channel_message_counts
         for number, channel in summary.channels.items():
             schema = summary.schemas.get(channel.schema_id)
@@ -108,20 +115,52 @@ def _reader(stream: IO[bytes]) -> McapReader:
     return make_reader(stream)
 
 
-def _refuse_bomb(stream: IO[bytes], index: ChunkIndex) -> None:
-    """Raise McapError for a chunk of more than MOST_BYTES, by its index or by its own word."""
-    size = index.uncompressed_size
-    stream.seek(index.chunk_start_offset)
-    head = stream.read(_CHUNK.size)
-    if len(head) == _CHUNK.size and index.compression == "zstd":
-        *_, own, _, length = _CHUNK.unpack(head)
-        frame = stream.read(min(length, 16) + 8 + ZSTD_HEADER_BYTES)[length + 8 :]
-        try:
-            size = max(size, own, zstandard.frame_content_size(frame))
-        except zstandard.ZstdError as error:
-            raise McapError(str(error)) from None
+def _refuse_bomb(stream: IO[bytes], at: int) -> None:
+    """Raise McapError if the chunk at an offset expands to more than MOST_BYTES.
+
+    The index says so too, but the reader goes by the chunk itself.
+    """
+    stream.seek(at)
+    try:
+        opcode, *_, size, _, length = _CHUNK.unpack(stream.read(_CHUNK.size))
+        compression = stream.read(min(length, 16))
+        (n_packed,) = _LENGTH.unpack(stream.read(_LENGTH.size))
+        if opcode != Opcode.CHUNK:
+            raise McapError("its index is wrong")
+        if compression == b"zstd":
+            frame = stream.read(min(n_packed, ZSTD_HEADER_BYTES))
+            size = max(size, zstandard.frame_content_size(frame))
+        elif compression == b"lz4":
+            size = max(size, _lz4_size(stream, n_packed))
+    except (struct.error, zstandard.ZstdError, RuntimeError) as error:
+        raise McapError(str(error)) from None
     if size > MOST_BYTES:
-        raise McapError(f"a chunk of {size} bytes")
+        raise McapError(f"a chunk of more than {MOST_BYTES} bytes")
+
+
+def _has_chunk(stream: IO[bytes]) -> bool:
+    """Whether there is a chunk before the end of the messages."""
+    stream.seek(len(HEAD) - 1)
+    while len(head := stream.read(_RECORD.size)) == _RECORD.size:
+        opcode, length = _RECORD.unpack(head)
+        if opcode in (Opcode.CHUNK, Opcode.DATA_END):
+            return bool(opcode == Opcode.CHUNK)
+        stream.seek(length, os.SEEK_CUR)
+    return False
+
+
+def _lz4_size(stream: IO[bytes], n_packed: int) -> int:
+    """Octets of an LZ4 frame, decompressed: up to MOST_BYTES and a piece, which are not kept."""
+    lz4_frame, size = lz4.frame.LZ4FrameDecompressor(), 0
+    while n_packed > 0 and not lz4_frame.eof and size <= MOST_BYTES:
+        packed = stream.read(min(n_packed, PIECE)) if lz4_frame.needs_input else b""
+        if lz4_frame.needs_input and not packed:
+            break
+        n_packed -= len(packed)
+        size += len(lz4_frame.decompress(packed, PIECE))
+    while not lz4_frame.eof and not lz4_frame.needs_input and size <= MOST_BYTES:
+        size += len(lz4_frame.decompress(b"", PIECE))
+    return size
 
 
 def _channel(channel: Channel, schema: Schema, n_messages: int) -> McapChannel:

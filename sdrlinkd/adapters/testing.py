@@ -2,6 +2,7 @@
 
 from types import ModuleType
 
+from sdrlinkd.adapters import mcap_bag
 from sdrlinkd.adapters.robot import ROOM_HALF_M, Pose
 from sdrlinkd.adapters.salvage import sqlite
 from sdrlinkd.adapters.typestore import ros2_types
@@ -14,6 +15,7 @@ __all__ = [
 ]
 
 CONSTANTS: dict[str, tuple[ModuleType, str]] = {
+    "most_in_chunk": (mcap_bag, "MOST_BYTES"),
     "most_steps": (sqlite, "MOST_STEPS"),
 }
 """Constants that tests replace: `monkeypatch.setattr(*CONSTANTS["most_steps"], 1 << 22)`."""

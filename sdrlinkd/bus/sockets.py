@@ -8,7 +8,7 @@ from pathlib import Path
 
 import zmq
 
-from sdrlinkd.client import endpoint, is_open
+from sdrlinkd.client import CONTROL_SOCKET, endpoint, is_open
 from sdrlinkd.errors import BusError
 from sdrlinkd.files import unwritable
 
@@ -106,18 +106,20 @@ def check_directory(path: Path) -> None:
 
 
 def running_in(path: Path) -> str:
-    """The process id of the daemon whose sockets are in `path`; empty if there is none."""
+    """The process id of the daemon whose sockets are in `path`; empty if there is none.
+
+    Its lock is not tried, which would be in the way of a daemon that starts meanwhile.
+    """
+    if not is_open(path / CONTROL_SOCKET):
+        return ""
     try:
         lock = os.open(path / LOCK_NAME, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
     except OSError:
-        return ""
+        return "unknown"
     try:
-        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError:
         return _owner(lock)
     finally:
         os.close(lock)
-    return ""
 
 
 def _owner(lock: int) -> str:

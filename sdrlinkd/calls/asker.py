@@ -82,6 +82,9 @@ class Asker:
     def hear(self, robot: int, packet: Packet, now: float) -> Ended | None:
         """Take a packet from the other half; the end of a call, if it is one."""
         if packet.boot != self._boot:
+            if packet.kind == Kind.ANSWER:
+                # Nobody here waits for it any more, so it need not be sent again.
+                self._acks.append(Sent(robot, Packet(Kind.ACK, packet.boot, packet.number)))
             return None
         asked = self._asked.get(packet.number)
         if packet.kind == Kind.ANSWER:

@@ -10,6 +10,8 @@ _HEAD = struct.Struct(">BBIIfB")
 GET_RESULT = "/_action/get_result"
 """End of the names of services that bring the results of actions, which may take long."""
 CANCEL_GOAL = "/_action/cancel_goal"
+_GOAL = slice(4, 20)
+"""Where the request to cancel has the goal's UUID."""
 MOST_KEPT = 256
 """Calls of one robot that are running or answered at a time."""
 
@@ -62,11 +64,12 @@ class Packet(NamedTuple):
 
     @property
     def is_long(self) -> bool:
-        """Whether it asks for the result of an action, or cancels its goals.
+        """Whether it asks for the result of an action, or cancels one goal of it.
 
-        Both may be asked for as long as the goal lasts, also over an outage.
+        Both may be asked for as long as the goal lasts, also over an outage. Who cancels all goals
+        means those of now.
         """
-        return self.name.endswith((GET_RESULT, CANCEL_GOAL))
+        return self.name.endswith(GET_RESULT) or (self.is_cancel and any(self.body[_GOAL]))
 
     @property
     def is_cancel(self) -> bool:

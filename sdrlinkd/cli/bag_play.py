@@ -112,7 +112,7 @@ def play(
     typer.echo(f"played {sum(played.sent.values())} messages of {bag}")
     if opened.damage:
         raise BagError(opened.damage)
-    if played.refused:
+    if played.refused.total():
         raise typer.Exit(1)
 
 
@@ -146,6 +146,7 @@ class _Part:
 
     def __init__(self, bag: Bag, routes: _Routes, start: float, duration: float | None) -> None:
         self._bag, self._to = bag, routes.to
+        self._damage = bag.damage
         self._start, self._duration = start, duration
         played = [each for each in bag.topics() if (each.name, each.type) in routes.to]
         self._latched = {
@@ -155,6 +156,11 @@ class _Part:
         if start or duration is not None:
             # Only reading all of them shows how many there are.
             self.n_messages = sum(1 for _ in self.messages())
+
+    @property
+    def is_damaged(self) -> bool:
+        """Whether damage was found since."""
+        return self._bag.damage != self._damage
 
     def messages(self) -> Iterator[BagMessage]:
         """The messages; those for late joiners that came before the start are the first."""
@@ -197,8 +203,9 @@ class _Played:
         self._clock, self._clock_topic = clock, clock_topic
         self.dropped = dropped
         self.sent: Counter[str] = Counter()
-        self.refused: dict[str, list[str]] = {}
-        self.pauses_s: list[float] = []
+        self.refused: Counter[str] = Counter()
+        self._reasons: dict[str, str] = {}
+        self._n_pauses, self._longest_s = 0, 0.0
         self._told_ns = -math.inf
         self._began = time.monotonic()
 
@@ -207,12 +214,24 @@ class _Played:
         name = self._routes.to[message.topic, message.type]
         if self._clock and not 0 <= message.time_ns - self._told_ns < SECOND_NS / self._clock:
             self._told_ns = message.time_ns
-            publisher.send(self._clock_topic, clock_message(message.time_ns))
-        try:
-            publisher.send(name, message.cdr, type=message.type)
+            now = clock_message(message.time_ns)
+            self._try(publisher, self._clock_topic, now, CLOCK_TYPE)
+        if self._try(publisher, name, message.cdr, message.type):
             self.sent[name] += 1
+
+    def shorten(self, pause_s: float) -> None:
+        """Note that a pause of the recording is played as a shorter one."""
+        self._n_pauses += 1
+        self._longest_s = max(self._longest_s, pause_s)
+
+    def _try(self, publisher: Publisher, name: str, cdr: bytes, kind: str) -> bool:
+        try:
+            publisher.send(name, cdr, type=kind)
         except MessageRefusedError as error:
-            self.refused.setdefault(name, []).append(str(error))
+            self.refused[name] += 1
+            self._reasons.setdefault(name, str(error).removeprefix(f"{name}: "))
+            return False
+        return True
 
     def table(self) -> FittedTable:
         """Each topic: what was sent, how often, and what the daemon did not send on."""
@@ -226,7 +245,7 @@ class _Played:
             dropped = self.dropped.of(name)
             table.add(
                 name, str(self.sent[name]), f"{self.sent[name] / lasted_s:.1f}",
-                str(len(self.refused.get(name, []))), str(dropped.total()),
+                str(self.refused[name]), str(dropped.total()),
                 ", ".join(f"{reason} {n}" for reason, n in dropped.most_common(2)),
             )  # fmt: skip
         return table
@@ -234,15 +253,12 @@ class _Played:
     @property
     def complaints(self) -> Iterator[str]:
         """What did not go as it was recorded, in lines."""
-        if self.pauses_s:
-            n = len(self.pauses_s)
-            yield (
-                f"{n} pause{'s' if n > 1 else ''} of up to {span(max(self.pauses_s))} shortened: "
-                "--max-gap"
-            )
-        for name, reasons in self.refused.items():
-            why = reasons[0].removeprefix(f"{name}: ")
-            yield f"not sent: {len(reasons)} messages of {name} ({why})"
+        if n := self._n_pauses:
+            pauses = f"{n} pause{'s' if n > 1 else ''} of up to {span(self._longest_s)}"
+            yield f"{pauses} shortened: --max-gap"
+        for name, n in self.refused.items():
+            if n:
+                yield f"not sent: {n} messages of {name} ({self._reasons[name]})"
 
 
 def _play(
@@ -266,13 +282,16 @@ def _play(
         try:
             for _ in itertools.count() if loop else range(1):
                 task = bar.add_task(name, total=part.n_messages)
-                messages = paced(
-                    part.messages(), rate, max_gap_s=max_gap, shortened=played.pauses_s.append
-                )
+                messages = paced(part.messages(), rate, max_gap_s=max_gap, shortened=played.shorten)
+                is_empty = True
                 for message in messages:
+                    is_empty = False
                     played.send(message, publisher)
                     bar.advance(task)
                 bar.remove_task(task)
+                if is_empty or part.is_damaged:
+                    # It would be read again and again at once.
+                    break
         finally:
             over.set()
             looking.join()
@@ -291,6 +310,8 @@ def _clock_topic(control: ControlClient, snapshot: Snapshot) -> str:
     own = f"/{snapshot.namespace.strip('/')}{CLOCK}" if snapshot.namespace else CLOCK
     taken = _taken(snapshot)
     known = next((name for name in (CLOCK, own) if name in taken), "")
+    if known and taken[known] != CLOCK_TYPE:
+        raise UserError(f"--clock: the daemon's {known} is {taken[known]}; allowed: {CLOCK_TYPE}")
     if not known:
         control.ask("declare", {"name": CLOCK, "type": CLOCK_TYPE, "reliability": "best_effort"})
     return known or CLOCK

@@ -177,7 +177,7 @@ def echo(
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(min=0.001, max=1000, help="Ask the sender for so many a second at most."),
+        typer.Option(min=0.02, max=1000, help="Ask the sender for so many a second at most."),
     ] = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:

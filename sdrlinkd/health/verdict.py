@@ -43,7 +43,7 @@ def is_silent(robot: NeighborReport) -> bool:
 def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport:
     """The verdict on `snapshot`; `shares_air`: other robots should be heard."""
     protection = PROTECTION.get(snapshot.link.security.mode, "sealed")
-    down = _down(snapshot, lately)
+    down = _down(snapshot, lately, shares_air)
     if down:
         return VerdictReport(level="DOWN", protection=protection, reasons=[down])
     # Causes come before what they explain.
@@ -62,7 +62,7 @@ def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport
     return VerdictReport(level=level, protection=protection, reasons=reasons)
 
 
-def _down(snapshot: Snapshot, lately: Lately) -> str:
+def _down(snapshot: Snapshot, lately: Lately, shares_air: bool) -> str:
     pdu_link = snapshot.carrier
     if snapshot.link.security.halted:
         return snapshot.link.security.halted
@@ -78,13 +78,15 @@ def _down(snapshot: Snapshot, lately: Lately) -> str:
         return f"no {name} since {since}{why}" + ("; check its cable" if name == "radio" else "")
     if pdu_link.state == "ended":
         return f"the {name} has ended"
-    if _is_accompanied(snapshot):
+    unlike = [*snapshot.link.security.strangers, *other_links(snapshot, lately)]
+    if _is_accompanied(snapshot) or not (shares_air and unlike):
         return ""
-    return "; ".join([*snapshot.link.security.strangers, *other_links(snapshot, lately)])
+    return "; ".join([*_machine(snapshot, lately), *unlike])
 
 
 def _is_accompanied(snapshot: Snapshot) -> bool:
-    return any(not each.is_self for each in snapshot.link.neighbors)
+    """Whether another robot is heard now."""
+    return any(not (each.is_self or is_silent(each)) for each in snapshot.link.neighbors)
 
 
 def other_links(snapshot: Snapshot, lately: Lately) -> list[str]:

@@ -18,11 +18,10 @@ from sdrlinkd.keyring.files import (
     write_key_file,
 )
 from sdrlinkd.keyring.making import new_key
-from sdrlinkd.keyring.state import SYSTEM_CONFIG, KeyState, machine_tag, state_dir
+from sdrlinkd.keyring.state import KeyState, machine_tag, service_name, state_dir
 
 __all__ = [
     "CREDENTIAL",
-    "SYSTEM_CONFIG",
     "KeyFile",
     "KeyState",
     "StoredKey",
@@ -36,6 +35,7 @@ __all__ = [
     "new_key",
     "parse_key_file",
     "read_key_file",
+    "service_name",
     "state_dir",
     "write_key_file",
     "zenoh_file",

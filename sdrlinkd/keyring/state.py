@@ -74,31 +74,11 @@ class KeyState:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             self.close()
-            raise UserError(self.held) from None
+            raise UserError(
+                f"{self.directory}: another daemon seals as robot {self._robot_id} with this "
+                "directory; allowed: one"
+            ) from None
         return self
-
-    @property
-    def held(self) -> str:
-        """What to say if another process holds it."""
-        return (
-            f"{self.directory}: another daemon seals as robot {self._robot_id} with this "
-            "directory; allowed: one"
-        )
-
-    @property
-    def is_held(self) -> bool:
-        """Whether another process holds it."""
-        try:
-            lock = os.open(self._lock_path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
-        except OSError:
-            return False
-        try:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError:
-            return True
-        finally:
-            os.close(lock)
-        return False
 
     def close(self) -> None:
         """Let other processes in."""
@@ -258,11 +238,21 @@ def state_dir(given: str, config_path: Path | None) -> Path:
     systemd = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     if systemd:
         return Path(systemd)
-    if config_path is not None and config_path.absolute().parent == SYSTEM_CONFIG:
-        name = config_path.stem
-        return SYSTEM_STATE / ("sdrlinkd" if name == "sdrlinkd" else f"sdrlinkd-{name}")
+    if config_path is not None and (service := service_name(config_path)):
+        return SYSTEM_STATE / service
     base = os.environ.get("XDG_STATE_HOME")
     return (Path(base) if base else Path.home() / ".local/state") / "sdrlinkd"
+
+
+def service_name(config_path: Path) -> str:
+    """What systemd calls the folders of the service with this configuration; empty if none has it.
+
+    They are `sdrlinkd`, or `sdrlinkd-NAME` of the service sdrlinkd@NAME.
+    """
+    if config_path.absolute().parent != SYSTEM_CONFIG:
+        return ""
+    name = config_path.stem
+    return "sdrlinkd" if name == "sdrlinkd" else f"sdrlinkd-{name}"
 
 
 def machine_hash() -> str:

@@ -138,8 +138,8 @@ class Resuming:
         lost = f"the numbers of key {self._key.kid} are lost here"
         if now < self._until:
             return (
-                f"{lost}, or it was never installed (then: sdrlinkctl key install --new); the other "
-                f"robots are asked for {ceil(self._until - now)} more seconds"
+                f"{lost}, or it was never installed (then: sdrlinkctl key install --new); the "
+                f"other robots are asked for {ceil(self._until - now)} more seconds"
             )
         who = "has heard this robot use it" if self.is_answered else "answers"
         return (

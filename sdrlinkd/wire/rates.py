@@ -24,7 +24,7 @@ def period_code(seconds: float) -> int:
 
     Raises ValueError for a period that is not positive.
     """
-    if not seconds > 0:
+    if not 0 < seconds < math.inf:
         raise ValueError(f"a period of {seconds} s")
     # Of rounding errors, the nearest code must not lose.
     return min(max(math.floor(_OFFSET + _STEPS * math.log2(seconds) + 1e-9), 0), MOST_CODE)

@@ -5,10 +5,14 @@ import sqlite3
 import struct
 import subprocess
 import sys
+from contextlib import closing
 from types import SimpleNamespace
 
+import lz4.frame
+import mcap.writer
 import pytest
 import zstandard
+from mcap.writer import CompressionType, IndexType, Writer
 
 from sdrlinkd.adapters import open_bag
 from sdrlinkd.adapters.testing import CONSTANTS
@@ -83,3 +87,45 @@ def test_a_view_without_end(tmp_path, monkeypatch):
     database.close()
     with pytest.raises(BagError, match="nothing in it can be recovered"):
         open_bag(path)
+
+
+def lz4_zeros(n_bytes):
+    """An LZ4 frame that does not say its size."""
+    frame = lz4.frame.LZ4FrameCompressor()
+    return frame.begin() + frame.compress(bytes(n_bytes)) + frame.flush()
+
+
+def zstd_zeros(n_bytes):
+    return zstandard.ZstdCompressor(write_content_size=False).compress(bytes(n_bytes))
+
+
+BOMBS = {CompressionType.LZ4: lz4_zeros, CompressionType.ZSTD: zstd_zeros}
+
+
+@pytest.mark.parametrize(
+    ("indexed", "says"),
+    [
+        (IndexType.ALL, r"a chunk of more than 1048576 bytes|did not decompress full frame"),
+        (IndexType.ALL & ~IndexType.CHUNK, "no chunk is in the index"),
+    ],
+)
+@pytest.mark.parametrize("compression", BOMBS)
+def test_a_chunk_of_an_indexed_mcap_file_that_says_it_is_small(
+    tmp_path, monkeypatch, compression, indexed, says
+):
+    monkeypatch.setattr(*CONSTANTS["most_in_chunk"], 1 << 20)
+    packed = BOMBS[compression](1 << 22)
+    small = SimpleNamespace(compress=lambda _: packed)
+    monkeypatch.setattr(mcap.writer, "lz4", SimpleNamespace(frame=small))
+    monkeypatch.setattr(mcap.writer, "zstandard", small)
+    path = tmp_path / "one.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=compression, index_types=indexed)
+        writer.start("ros1", "a test")
+        number = writer.register_schema("std_msgs/String", "ros1msg", b"string data")
+        writer.add_message(writer.register_channel("/say", "ros1", number), 0, bytes(1 << 11), 0)
+        writer.finish()
+    with pytest.raises(BagError, match=says):  # noqa: PT012
+        with closing(open_bag(path)) as bag:
+            list(bag.messages())
+        raise BagError(bag.damage)

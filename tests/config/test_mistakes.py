@@ -8,10 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
+import zmq
 from msgspec import inspect
 
 from sdrlinkd.__main__ import main
 from sdrlinkd.bus import RuntimeDirectory
+from sdrlinkd.client import CONTROL_SOCKET
 from sdrlinkd.config import Config
 
 ETC = Path(__file__).parents[2] / "etc"
@@ -198,8 +200,11 @@ def test_a_check_beside_a_running_daemon_passes_and_leaves_no_trace(check, tmp_p
     text = f'[bus]\nruntime_dir = "{directory}"'
     assert check(text)[0] == 0
     assert not directory.exists()
-    running = RuntimeDirectory(directory)
+    running, context = RuntimeDirectory(directory), zmq.Context()
+    bound = running.bind(context, zmq.ROUTER, CONTROL_SOCKET, {})
     code, out, _ = check(text)
+    bound.close()
+    context.term()
     running.close()
     assert code == 0
     assert f"a daemon runs in {directory}, process {os.getpid()}" in out

@@ -128,6 +128,8 @@ def test_once_its_producers_have_ended_another_type_may_have_the_name(start_daem
     first = declare(daemon, "/robot_1/chg")
     with pytest.raises(RefusedError, match="in use; end that"):
         ask(daemon, "declare", name="/robot_1/chg", type="std_msgs/msg/Int32")
+    with pytest.raises(RefusedError, match=r"got type 'std_msgs/msg/Int8'; it is std_msgs"):
+        ask(daemon, "undeclare", name="/robot_1/chg", type="std_msgs/msg/Int8")
     ask(daemon, "undeclare", name="/robot_1/chg")
     with Subscriber("/rx_robot_1/chg", directory=daemon.directory) as heard:
         told = ask(daemon, "declare", name="/robot_1/chg", type="std_msgs/msg/Int32")
@@ -179,7 +181,8 @@ def test_consumers_get_no_more_than_they_ask_for(start_daemon, tmp_path_factory)
             # The way back: the lease ends.
             wait_for(lambda: send(10) == 0, 60)
             assert heard.receive(20) is not None
-        for wrong in (0, -1, 1e9, "two", None):
+        assert ask(two, "rate", topic="/rx_robot_1/a", hz=0)["hz"] == 0, "all"
+        for wrong in (-1, 1e-320, 0.01, 1e9, "two", None):
             with pytest.raises(RefusedError, match="hz: got"):
                 ask(two, "rate", topic="/rx_robot_1/a", hz=wrong)
 

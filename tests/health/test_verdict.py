@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from sdrlinkd.health import Health
-from sdrlinkd.reports import ReceivedTopicReport, SecurityReport
+from sdrlinkd.reports import OtherLinkReport, ReceivedTopicReport, SecurityReport
 from tests.health.snapshots import robot, snapshot, topic
 
 CURE = re.compile(
@@ -209,3 +209,21 @@ def test_old_messages_are_named_where_they_wait_and_where_they_come():
         seen, link=replace(seen.link, topics=[], received=[replace(late, delivered_per_s=0.0)])
     )
     assert verdict(seen) == ("OK", [])
+
+
+OTHER_NETWORK = {"network": 7, "others": [OtherLinkReport(network=9, pdu_size=1024)]}
+
+
+def test_another_network_is_the_cause_only_of_hearing_nobody():
+    gone = robot(last_heard_s_ago=60.0, usual_gap_s=0.1)
+    for robots, level in (([], "DOWN"), ([gone], "DOWN"), ([robot()], "OK")):
+        told, reasons = verdict(snapshot(carrier=OTHER_NETWORK, robots=robots))
+        assert (told, "another network" in " ".join(reasons)) == (level, level == "DOWN")
+    alone = snapshot(carrier=OTHER_NETWORK, robots=[])
+    assert verdict(alone, shares_air=False)[0] == "DEGRADED"
+
+
+def test_a_receiver_that_clips_may_explain_why_only_another_network_is_heard():
+    clipped = snapshot(carrier=OTHER_NETWORK | {"clipped_pct": 2.0}, robots=[])
+    (reason,) = verdict(clipped)[1]
+    assert reason.startswith("the receiver clips 2 % of the samples: lower its gain; a robot is")

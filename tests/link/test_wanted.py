@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.link import Offer
+from sdrlinkd.link import Offer, Overrides, TopicPolicy
 from sdrlinkd.link.topics import LEASE_S, Demand, OwnTopics, Wants
 from sdrlinkd.wire import Registry, Wanted
 from tests.laws import law
@@ -97,3 +97,60 @@ def test_subscriptions_that_come_and_go_do_not_fill_the_air():
     assert [(each.node, len(each.topics)) for each in found] == [
         (1, 100), (1, 100), (1, 40), (2, 100), (2, 100), (2, 40),
     ]  # fmt: skip
+
+
+def submitted(link, topic_id, now, period_s, n, **more):
+    """How many of n messages, one each `period_s`, are taken."""
+    return sum(
+        link.submit(topic_id, CDR, now + i * period_s, Overrides(**more)) is None for i in range(n)
+    )
+
+
+def slowed(*policies):
+    """A robot of whose one topic another wants a message in 10 s; and the topic's number."""
+    links = team(1)
+    one, two = links
+    wanted = 1, base_of(two, "sensors/number_0")
+    number = one.topic_named("sensors/number_0").id
+    one.set_policies(dict.fromkeys([number], *policies) if policies else {})
+    two.want([wanted], {wanted: 10.0})
+    run(links, 10.0, 20)
+    return links, wanted, number
+
+
+def test_consumers_get_as_many_as_they_ask_for_and_all_once_they_ask_for_all():
+    (one, two), wanted, number = slowed()
+    assert submitted(one, number, 11.0, 0.1, 10) == 1
+    two.want([wanted], {wanted: 0.2})
+    run([one, two], 12.0, 20)
+    assert submitted(one, number, 13.0, 0.1, 10) == 5
+    two.want([wanted])
+    run([one, two], 14.0, 80)
+    assert submitted(one, number, 14.0 + LEASE_S + 1.0, 0.1, 10) == 10
+
+
+def test_a_rate_holds_for_each_producer_of_a_topic():
+    (one, _), _, number = slowed()
+    for key in ("camera", "lidar"):
+        assert submitted(one, number, 11.0, 0.1, 10, key=key) == 1
+
+
+@pytest.mark.parametrize("more", [{"dst": 2}, {"receipt": "mine"}])
+def test_what_somebody_waits_for_is_not_slowed(more):
+    (one, _), _, number = slowed()
+    assert submitted(one, number, 11.0, 0.1, 10, **more) == 10
+
+
+@pytest.mark.parametrize(
+    "policy", [TopicPolicy(deadman_s=1.0), TopicPolicy(durability="transient_local")]
+)
+def test_what_must_arrive_is_not_slowed(policy):
+    (one, _), _, number = slowed(policy)
+    assert submitted(one, number, 11.0, 0.1, 10) == 10
+
+
+def test_no_consumer_can_ask_for_less_than_a_message_a_minute():
+    (one, two), wanted, number = slowed()
+    two.want([wanted], {wanted: 1e6})
+    run([one, two], 12.0, 20)
+    assert submitted(one, number, 13.0, 10.0, 13) == 3

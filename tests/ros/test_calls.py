@@ -226,3 +226,18 @@ def test_any_octets_are_a_packet_or_none(octets):
 def test_a_packet_is_read_as_it_was_built(kind):
     packet = Packet(kind, 0xFFFFFFFF, 1, "/a/b", Status.BUSY, 0.5, b"body")
     assert Packet.parse(packet.build()) == packet
+
+
+def test_who_cancels_one_goal_waits_as_long_as_for_its_result_and_who_cancels_all_does_not():
+    """After an outage, goals of then are not those that were meant."""
+    for goal, is_long in ((b"\1" * 16, True), (bytes(16), False)):
+        body = b"\0\1\0\0" + goal + bytes(8)
+        packet = Packet(Kind.REQUEST, 1, 2, "/arm/go/_action/cancel_goal", body=body)
+        assert (packet.is_cancel, packet.is_long) == (True, is_long)
+
+
+def test_an_answer_that_comes_after_a_restart_is_acknowledged_and_no_more():
+    asker = Asker(7, Random(1))
+    assert asker.hear(1, Packet(Kind.ANSWER, 6, 5, body=b"late"), 0.0) is None
+    (sent,) = asker.due(0.1)
+    assert (sent.packet.kind, sent.packet.boot, sent.packet.number) == (Kind.ACK, 6, 5)

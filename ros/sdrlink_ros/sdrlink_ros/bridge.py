@@ -130,8 +130,8 @@ class Bridge:
         wanted = frozenset() if demand is None else demand.wanted
         parts.outgoing.want(self._routes.taken, wanted, self._of_actions, now)
         parts.incoming.look(parts.outgoing.taker.taps, now, self._is_refused)
-        if is_due and demand is not None and settings.rates:
-            self._ask_rates(parts)
+        if is_due and demand is not None:
+            self._ask_rates(parts, demand.rated)
         if is_due and parts.state.is_wanted:
             snapshot = self._daemon.ask("status") if demand is not None else None
             told = report.topics(self._routes, parts.outgoing, parts.incoming, parts.services)
@@ -140,13 +140,17 @@ class Bridge:
         if self._looks == SETTLED_LOOKS:
             self._say_unused(settings)
 
-    def _ask_rates(self, parts: "_Parts") -> None:
-        """Ask others for no more messages than the parameter says are enough."""
-        try:
-            for bus, hz in parts.incoming.rates(self._parameters.settings).items():
-                self._daemon.ask("rate", {"topic": bus, "hz": hz})
-        except RefusedError as error:
-            self._sayings.once(f"rates: {error}")
+    def _ask_rates(self, parts: "_Parts", rated: "frozenset[str]") -> None:
+        """Ask others for no more messages than the parameter says are enough.
+
+        Of topics that another program here has `rated`, it asks for all where nothing is said.
+        """
+        asked = parts.incoming.rates(self._parameters.settings)
+        asked |= dict.fromkeys((parts.incoming.wanted & rated) - asked.keys(), 0.0)
+        for bus, hz in asked.items():
+            refused = self._daemon.rate(bus, hz)
+            if refused:
+                self._sayings.once(f"rates: {refused}")
 
     def _look_at_graph(self, parts: "_Parts") -> None:
         """Decide anew what becomes of the topics of this graph, and of those of other robots."""

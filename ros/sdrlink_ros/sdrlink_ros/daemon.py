@@ -22,6 +22,8 @@ class Demand(NamedTuple):
     boot: str
     version: int
     wanted: frozenset[str]
+    rated: frozenset[str]
+    """Topics of others for which a program here has asked for a rate."""
 
 
 class Daemon:
@@ -46,16 +48,25 @@ class Daemon:
         """
         told = self.ask("demand", {"says": says})
         if told is not None:
-            self._demand = Demand(told["boot"], told["version"], frozenset(told["wanted"]))
+            wanted, rated = frozenset(told["wanted"]), frozenset(told["rated"])
+            self._demand = Demand(told["boot"], told["version"], wanted, rated)
         elif self._busy_since is None:
             self._demand = None
         # A daemon that is busy still takes messages, and wants what it wanted.
         return self._demand
 
-    def undeclare(self, bus: str) -> None:
-        """Tell the daemon that no node here publishes a topic any more."""
+    def rate(self, bus: str, hz: float) -> str:
+        """Ask another robot for no more than `hz` messages a second; why that was refused."""
+        try:
+            self.ask("rate", {"topic": bus, "hz": hz})
+        except RefusedError as error:
+            return str(error)
+        return ""
+
+    def undeclare(self, bus: str, kind: str) -> None:
+        """Tell the daemon that no node here publishes a topic of this type any more."""
         with contextlib.suppress(RefusedError):
-            self.ask("undeclare", {"name": bus})
+            self.ask("undeclare", {"name": bus, "type": kind})
 
     def declare(self, arguments: dict[str, Any]) -> int | None:
         """Declare a topic; its number, or None without a daemon. Raises RefusedError."""

@@ -96,7 +96,9 @@ class Incoming:
         found = {}
         for bus in self._wanted:
             outlet = self._outlets.get(bus)
-            hz = None if outlet is None else rate_of(outlet.names, settings.rates)
+            if outlet is None or outlet.is_command:
+                continue
+            hz = rate_of(outlet.names, settings.rates)
             if hz is not None:
                 found[bus] = hz
         return found

@@ -12,7 +12,7 @@ LARGE = ("sensor_msgs/msg/Image", "sensor_msgs/msg/PointCloud2")
 """Types that would fill a radio link."""
 EVERYTHING = ("*", "/*")
 MOST_NEAR = 3
-MOST_HZ = 1000.0
+LEAST_HZ, MOST_HZ = 0.02, 1000.0
 
 
 def matches(name: str, patterns: Iterable[str]) -> bool:
@@ -112,7 +112,7 @@ def is_rate(text: str) -> bool:
     """Whether a text is a pattern and a rate in Hz, as in `/robot_2/scan:=2`."""
     pattern, _, hz = text.partition(":=")
     try:
-        return bool(pattern) and 0 < float(hz) <= MOST_HZ
+        return bool(pattern) and LEAST_HZ <= float(hz) <= MOST_HZ
     except ValueError:
         return False
 

@@ -84,14 +84,15 @@ class Outgoing:
             self._boot = boot
             self._told.clear()
             self._again_at.clear()
-        for name in [each for each in self.refused if each not in routes]:
-            self._clear(name)
         for name, told in list(self._told.items()):
             route = routes.get(name)
             if route is None or told[:2] != _declaration(route)[:2]:
-                # Its last publisher has gone: another type may take the name.
-                daemon.undeclare(told[0])
+                if name not in self.refused:
+                    # Its last publisher has gone: another type may take the name.
+                    daemon.undeclare(told[0], told[1])
                 del self._told[name]
+        for name in [each for each in self.refused if each not in routes]:
+            self._clear(name)
         for name, route in routes.items():
             is_new = self._told.get(name) != _declaration(route) or self._is_due(name)
             if is_new and self._declare(name, route, daemon):

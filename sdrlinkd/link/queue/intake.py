@@ -22,6 +22,7 @@ from sdrlinkd.link.schedule import ClassesParams
 from sdrlinkd.link.topics import IDLE_S, OwnTopics
 from sdrlinkd.reports import RelayReport, TopicReport
 from sdrlinkd.wire import (
+    BROADCAST,
     FIRST_NUMBER,
     PARTS,
     Pdu,
@@ -138,7 +139,12 @@ class Intake:
         topic = self._topics[topic_id]
         topic.used_at = now
         topic.tally.accept(len(payload))
-        refused = topic.admission.refuse(payload, now) if is_admitted else "tx_not_admitted"
+        refused: str | None = "tx_not_admitted"
+        if is_admitted:
+            dst = topic.dst if overrides.dst is None else overrides.dst
+            policy = topic.policy_to(dst)
+            is_awaited = policy.is_command or dst != BROADCAST or bool(overrides.receipt)
+            refused = topic.admission.refuse(payload, now, overrides.key, is_for_all=not is_awaited)
         if refused:
             topic.tally.drop(refused)
             return refused

@@ -7,6 +7,8 @@ from sdrlinkd.wire import RatesAsked, Wanted, period_s
 
 LEASE_S = 3.0
 """Time in s for which a WANTED record holds."""
+MOST_PERIOD_S = 60.0
+"""Longest period that is granted, whatever is asked for."""
 
 
 class Demand:
@@ -36,7 +38,8 @@ class Demand:
         for number, code in asked.periods:
             about = self._topics.told.get(number)
             if about is not None:
-                self._periods[about.name, src] = period_s(code), at + LEASE_S
+                period = min(period_s(code), MOST_PERIOD_S)
+                self._periods[about.name, src] = period, at + LEASE_S
 
     def periods(self, now: float) -> dict[str, float]:
         """The period in s that suffices all who want a topic at `now`, by name.
