@@ -88,7 +88,7 @@ PLENTY = QueueParams(max_messages=10_000, max_bytes=1 << 30, max_airtime_s=inf)
 )  # fmt: skip
 def test_what_a_policy_admits(policy, given_to, refused):
     admission = Admission(TopicPolicy(**policy))
-    told = [admission.refuse(text.encode(), at) for at, text in given_to]
+    told = [admission.refuse(text.encode(), at, is_for_all=True) for at, text in given_to]
     if "on_change" in policy and "period_s" in policy:
         # 2.5 s is before the next time of the grid, 3 s is not.
         refused = [*refused[:5], None, "tx_unchanged"]
