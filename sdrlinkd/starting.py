@@ -10,7 +10,6 @@ from sdrlinkd.adapters import open_bag, unknown_types
 from sdrlinkd.bus import check_directory, running_in
 from sdrlinkd.config import Config, Setup, located
 from sdrlinkd.errors import UserError
-from sdrlinkd.files import unwritable
 from sdrlinkd.keeping import key_state, usable
 from sdrlinkd.keyring import load_keys, service_name
 from sdrlinkd.pdulink import try_gnuradio
@@ -49,11 +48,7 @@ def _check_keys(setup: Setup) -> list[str]:
     if security.mode == "off":
         return []
     state = key_state(setup)
-    if problem := unwritable(state.directory):
-        raise UserError(
-            f"security.state_dir: {state.directory} cannot be used ({problem}); allowed: a "
-            "directory that this user may write to, as numbers must survive a restart"
-        )
+    state.refuse_unwritable()
     with _of("security.keys"):
         keys = load_keys(Path(security.keys))
     loaded = state.load(keys)

@@ -4,13 +4,13 @@ from math import inf
 from typing import Any
 
 from sdrlinkd.bus import Bus, shown
+from sdrlinkd.client import LEAST_RATE_HZ, MOST_RATE_HZ
 from sdrlinkd.config import Setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Link
 
 LEASE_S = 5.0
 """Time in s for which a rate that a consumer asks for holds."""
-LEAST_HZ, MOST_HZ = 0.02, 1000.0
 MOST_ASKED = 1000
 
 
@@ -37,9 +37,10 @@ class Wanting:
         topic, hz = str(arguments.get("topic", "")), arguments.get("hz")
         if not topic.startswith("/"):
             raise UserError(f"topic: got {shown(topic)!r}; allowed: a topic of another robot")
-        if not isinstance(hz, int | float) or not (hz == 0 or LEAST_HZ <= hz <= MOST_HZ):
+        if not isinstance(hz, int | float) or not (hz == 0 or LEAST_RATE_HZ <= hz <= MOST_RATE_HZ):
             raise UserError(
-                f"hz: got {shown(str(hz))}; allowed: 0 (all), or from {LEAST_HZ:g} to {MOST_HZ:g}"
+                f"hz: got {shown(str(hz))}; allowed: 0 (all), or from {LEAST_RATE_HZ:g} to "
+                f"{MOST_RATE_HZ:g}"
             )
         key = topic.encode() + b"\0", 1 / hz if hz else 0.0
         if len(self._asked) >= MOST_ASKED and key not in self._asked:

@@ -22,12 +22,12 @@ from rosbags.interfaces import (
 
 from sdrlinkd.adapters.mcap_bag import IndexedMcap, McapChannel, needs_mcap
 from sdrlinkd.adapters.salvage import Piece, looks_cut, salvage
+from sdrlinkd.adapters.salvage.bounds import ZSTD_HEADER_BYTES
 from sdrlinkd.adapters.typestore import Ros1Converter, ros2_types
 from sdrlinkd.errors import BagError
 
 # Most characters of a reader's error that are shown.
 MAX_REASON = 200
-ZSTD_HEADER_BYTES = 18
 MOST_DEPTH = 10_000
 
 

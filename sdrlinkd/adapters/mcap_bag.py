@@ -16,14 +16,13 @@ from mcap.summary import Summary
 from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import parse_qos
 
-from sdrlinkd.adapters.salvage.bounds import MOST_BYTES, PIECE
+from sdrlinkd.adapters.salvage.bounds import MOST_BYTES, PIECE, ZSTD_HEADER_BYTES
 
 HEAD = b"\x89MCAP0\r\n\x01"
 """The magic, and the opcode of the header."""
 ROS2, ROS1 = "cdr", "ros1"
 """Message encodings that can be played."""
 PROFILE = "ros2"
-ZSTD_HEADER_BYTES = 18
 _CHUNK = struct.Struct("<BQQQQII")
 """Opcode, length, two times, size, CRC-32, and the length of the compression's name."""
 _RECORD = struct.Struct("<BQ")
@@ -152,14 +151,12 @@ def _has_chunk(stream: IO[bytes]) -> bool:
 def _lz4_size(stream: IO[bytes], n_packed: int) -> int:
     """Octets of an LZ4 frame, decompressed: up to MOST_BYTES and a piece, which are not kept."""
     lz4_frame, size = lz4.frame.LZ4FrameDecompressor(), 0
-    while n_packed > 0 and not lz4_frame.eof and size <= MOST_BYTES:
+    while not lz4_frame.eof and size <= MOST_BYTES:
         packed = stream.read(min(n_packed, PIECE)) if lz4_frame.needs_input else b""
         if lz4_frame.needs_input and not packed:
             break
         n_packed -= len(packed)
         size += len(lz4_frame.decompress(packed, PIECE))
-    while not lz4_frame.eof and not lz4_frame.needs_input and size <= MOST_BYTES:
-        size += len(lz4_frame.decompress(b"", PIECE))
     return size
 
 

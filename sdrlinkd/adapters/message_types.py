@@ -1,13 +1,12 @@
 """What the daemon must know of message types: stop messages, and which begin with a header."""
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 
 from sdrlinkd.adapters.fields import cdr_from_fields
 from sdrlinkd.adapters.stops import begins_with_header, stop_messages
 from sdrlinkd.adapters.typestore import knows, ros2_types
 from sdrlinkd.config import Setup
-from sdrlinkd.errors import UserError
+from sdrlinkd.errors import UserError, did_you_mean
 from sdrlinkd.link import HeardTopic
 
 MOST_TYPES = 1000
@@ -22,9 +21,8 @@ def unknown_types(setup: Setup) -> list[str]:
     for topic in setup.registry.topics:
         if topic.type in names or topic.type.split("/")[0] not in packages:
             continue
-        close = get_close_matches(topic.type, names, n=1)
-        meant = f"; did you mean {close[0]}?" if close else ""
-        found.append(f"{topic.name}: the type {topic.type} is unknown{meant}")
+        hint = did_you_mean(topic.type, names)
+        found.append(f"{topic.name}: the type {topic.type} is unknown{hint}")
     return found
 
 

@@ -20,7 +20,16 @@ from sdrlinkd.asking import ask_status
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.completion import heard_names, one_of, robot_names, topic_names
 from sdrlinkd.cli.names import refuse_own, topic_sent
-from sdrlinkd.client import QOS, Message, NoDaemonError, Publisher, RefusedError, Subscriber
+from sdrlinkd.client import (
+    LEAST_RATE_HZ,
+    MOST_RATE_HZ,
+    QOS,
+    Message,
+    NoDaemonError,
+    Publisher,
+    RefusedError,
+    Subscriber,
+)
 from sdrlinkd.errors import CdrError, UserError
 from sdrlinkd.link import CDR_HEADER_SIZE
 from sdrlinkd.units import seconds
@@ -177,7 +186,11 @@ def echo(
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(min=0.02, max=1000, help="Ask the sender for so many a second at most."),
+        typer.Option(
+            min=LEAST_RATE_HZ,
+            max=MOST_RATE_HZ,
+            help="Ask the sender for so many a second at most.",
+        ),
     ] = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
@@ -211,8 +224,9 @@ def _asking(topic: str, hz: float, runtime_dir: Path | None) -> Iterator[None]:
     over = threading.Event()
 
     def ask() -> None:
-        with contextlib.suppress(NoDaemonError, RefusedError), connect(runtime_dir) as control:
-            while not over.wait(RENEW_S):
+        while not over.wait(RENEW_S):
+            # A daemon that is away may come back.
+            with contextlib.suppress(NoDaemonError, RefusedError), connect(runtime_dir) as control:
                 control.ask("rate", {"topic": topic, "hz": hz})
 
     with connect(runtime_dir) as control:

@@ -9,14 +9,13 @@ import typer
 from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
 from sdrlinkd.cli.completion import one_of, robot_names, topic_names
 from sdrlinkd.cli.reserving import answer_of_team, asked_air, verdict_words
+from sdrlinkd.config import LONG_LIFESPAN_S
 from sdrlinkd.errors import UserError
 from sdrlinkd.units import octets, seconds
 
 Topic = Annotated[str, typer.Argument(help="Topic name on the bus or in the registry.",
                                       autocompletion=topic_names)]  # fmt: skip
 Text = str | None
-LONG_S = 60.0
-"""Lifespan in s above which messages of an urgent class are hardly meant to live."""
 QOS = ("urgent", "latency", "default", "bulk")
 
 
@@ -118,7 +117,7 @@ def set_policy(
             f"  {key}: {_shown(key, answer['old'][key])} -> {_shown(key, answer['new'][key])}"
         )
     lifespan_s = changes.get("lifespan_s", 0.0)
-    if LONG_S < lifespan_s < inf and answer["new"]["qos"] in ("urgent", "latency"):
+    if LONG_LIFESPAN_S < lifespan_s < inf and answer["new"]["qos"] in ("urgent", "latency"):
         typer.echo(
             f"warning: {answer['new']['qos']} messages may be {lifespan_s:g} s old when they "
             f"arrive; for milliseconds, give {lifespan_s:g}ms",

@@ -19,7 +19,9 @@ on Python 3.10 and newer.
 from typing import TYPE_CHECKING
 
 from sdrlinkd.client.announced import (
+    LEAST_RATE_HZ,
     MAX_KEY_BYTES,
+    MOST_RATE_HZ,
     QOS,
     check_wishes,
     too_large,
@@ -71,7 +73,9 @@ __all__ = [
     "IN_PUB_SOCKET",
     "IN_SOCKET",
     "LATE_PREFIX",
+    "LEAST_RATE_HZ",
     "MAX_KEY_BYTES",
+    "MOST_RATE_HZ",
     "OUT_SOCKET",
     "QOS",
     "RECEIPT_PREFIX",

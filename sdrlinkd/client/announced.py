@@ -11,6 +11,8 @@ from sdrlinkd.client.errors import UNKNOWN_TOPIC, MessageRefusedError
 
 QOS = ("bulk", "default", "latency", "urgent")
 MAX_PRIORITY = 127
+LEAST_RATE_HZ, MOST_RATE_HZ = 0.02, 1000.0
+"""Rates in Hz that a consumer can ask for."""
 BROADCAST = 255
 CDR_HEADER_SIZE = 4
 MAX_KEY_BYTES = 32

@@ -43,7 +43,7 @@ from sdrlinkd.wire import (
 )
 
 MIN_BEACON_S = 0.01
-LONG_S = 60.0
+LONG_LIFESPAN_S = 60.0
 """Lifespan in s above which messages of an urgent class are hardly meant to live."""
 _NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _RX_NAME = re.compile(r"(/[A-Za-z_]\w*)+/?", re.ASCII)
@@ -310,7 +310,7 @@ def _lifespan_warnings(named: Mapping[str, TopicPolicy]) -> list[str]:
         for name, policy in named.items()
         if policy.qos in ("urgent", "latency")
         and policy.lifespan_s is not None
-        and policy.lifespan_s > LONG_S
+        and policy.lifespan_s > LONG_LIFESPAN_S
     ]
 
 

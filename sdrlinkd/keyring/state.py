@@ -17,6 +17,7 @@ import msgspec
 from msgspec import Meta, structs
 
 from sdrlinkd.errors import UserError
+from sdrlinkd.files import unwritable
 from sdrlinkd.keyring.files import RobotId
 from sdrlinkd.sealing import Key, Remembered
 from sdrlinkd.wire import N_TICKS, TICKS_PER_S
@@ -64,12 +65,11 @@ class KeyState:
 
     def hold(self) -> Self:
         """Keep other processes out until `close`. Raises UserError."""
+        path = self.directory / f"robot-{self._robot_id}.lock"
         try:
-            self._lock = os.open(
-                self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600
-            )
+            self._lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
         except OSError as error:
-            raise UserError(self._unusable(error)) from None
+            raise UserError(self._unusable(error.strerror)) from None
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -144,7 +144,7 @@ class KeyState:
         try:
             self._write(state, owner)
         except OSError as error:
-            raise UserError(self._unusable(error)) from None
+            raise UserError(self._unusable(error.strerror)) from None
 
     @property
     def is_whole(self) -> bool:
@@ -165,7 +165,12 @@ class KeyState:
             with tempfile.NamedTemporaryFile(dir=self.directory, prefix=".try-"):
                 pass
         except OSError as error:
-            raise UserError(self._unusable(error)) from None
+            raise UserError(self._unusable(error.strerror)) from None
+
+    def refuse_unwritable(self) -> None:
+        """As `check`, but nothing is made or written. Raises UserError."""
+        if problem := unwritable(self.directory):
+            raise UserError(self._unusable(problem))
 
     def _known(self) -> frozenset[int]:
         """All robots of which a sealed PDU was opened, with whatever key."""
@@ -176,13 +181,9 @@ class KeyState:
                 found |= state.newest.keys() if state is not None else set()
         return frozenset(found)
 
-    @property
-    def _lock_path(self) -> Path:
-        return self.directory / f"robot-{self._robot_id}.lock"
-
-    def _unusable(self, error: OSError) -> str:
+    def _unusable(self, problem: str | None) -> str:
         return (
-            f"security.state_dir: {self.directory} cannot be used ({error.strerror}); allowed: a "
+            f"security.state_dir: {self.directory} cannot be used ({problem}); allowed: a "
             "directory that this user may write to, as numbers must survive a restart"
         )
 

@@ -22,7 +22,7 @@ class RatesAsked(NamedTuple):
 def period_code(seconds: float) -> int:
     """The code of the longest period that does not exceed `seconds`; the shortest one: about 1 ms.
 
-    Raises ValueError for a period that is not positive.
+    Raises ValueError for a period that is not positive and finite.
     """
     if not 0 < seconds < math.inf:
         raise ValueError(f"a period of {seconds} s")

@@ -6,6 +6,7 @@ import struct
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import pytest
 
@@ -227,8 +228,9 @@ def test_a_subscriber_gets_no_more_than_it_asks_for(start_daemon, start, hub):
     wait_for(is_whole, WAIT_S)
 
 
-def test_a_busy_daemon_is_not_said_to_be_away(start_daemon, start, hub):
-    """It is stopped for two seconds; what nodes publish meanwhile arrives."""
+@contextmanager
+def odometry(start_daemon, start, hub):
+    """A bridged robot that publishes /odom, and another one that has heard it."""
     one = Robot(start, start_daemon(config(hub, 1))).bridged()
     two = start_daemon(config(hub, 2))
     one.node.pub(topic="/odom", type=ODOM[1])
@@ -236,6 +238,12 @@ def test_a_busy_daemon_is_not_said_to_be_away(start_daemon, start, hub):
         matched(one, "/odom")
         one.node.send(topic="/odom")
         assert heard.receive(WAIT_S) is not None
+        yield one, heard
+
+
+def test_a_busy_daemon_is_not_said_to_be_away(start_daemon, start, hub):
+    """It is stopped for two seconds; what nodes publish meanwhile arrives."""
+    with odometry(start_daemon, start, hub) as (one, heard):
         one.daemon.send_signal(signal.SIGSTOP)
         one.bridge.says("the daemon answers slowly (more than 1 s)")
         one.node.send(topic="/odom", first=1)
@@ -247,13 +255,7 @@ def test_a_busy_daemon_is_not_said_to_be_away(start_daemon, start, hub):
 
 
 def test_a_daemon_that_ends_and_starts_again_is_waited_for(start_daemon, start, hub):
-    one = Robot(start, start_daemon(config(hub, 1))).bridged()
-    two = start_daemon(config(hub, 2))
-    one.node.pub(topic="/odom", type=ODOM[1])
-    with Subscriber("/rx_robot_1/odom", directory=two.directory) as heard:
-        matched(one, "/odom")
-        one.node.send(topic="/odom")
-        assert heard.receive(WAIT_S) is not None
+    with odometry(start_daemon, start, hub) as (one, heard):
         one.daemon.stop()
         one.bridge.says("waiting for the daemon; messages are lost meanwhile")
         one.node.send(topic="/odom", first=1)

@@ -6,13 +6,14 @@ from collections.abc import Iterable, Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
+from sdrlinkd.client import LEAST_RATE_HZ, MOST_RATE_HZ
+
 NEVER = ("/rosout", "/parameter_events", "/clock", "/diagnostics_agg")
 """Topics that only matter on their own robot."""
 LARGE = ("sensor_msgs/msg/Image", "sensor_msgs/msg/PointCloud2")
 """Types that would fill a radio link."""
 EVERYTHING = ("*", "/*")
 MOST_NEAR = 3
-LEAST_HZ, MOST_HZ = 0.02, 1000.0
 
 
 def matches(name: str, patterns: Iterable[str]) -> bool:
@@ -112,7 +113,7 @@ def is_rate(text: str) -> bool:
     """Whether a text is a pattern and a rate in Hz, as in `/robot_2/scan:=2`."""
     pattern, _, hz = text.partition(":=")
     try:
-        return bool(pattern) and LEAST_HZ <= float(hz) <= MOST_HZ
+        return bool(pattern) and LEAST_RATE_HZ <= float(hz) <= MOST_RATE_HZ
     except ValueError:
         return False
 

@@ -8,3 +8,5 @@ MOST_STEPS = 1 << 30
 """Most steps of SQLite's machine for one query."""
 PIECE = 1 << 20
 """Octets that are decompressed at once."""
+ZSTD_HEADER_BYTES = 18
+"""Most octets of a zstd frame's header, which may say how much it holds."""
