@@ -288,7 +288,7 @@ def hub_gone(stage, _):
 
 
 def stopping(stage, _):
-    one, _ = stage.hub().team(top='registry = ""\ndrain_s = 30\n')
+    one, _ = stage.hub().team(top='registry = ""\ndrain_s = 6\n')
     name = declared(one, 1, history="keep_all", lifespan_s=1e4)
     with Publisher(one.directory) as out:
         for _ in range(2000):
