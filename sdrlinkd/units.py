@@ -5,6 +5,8 @@ import re
 
 from sdrlinkd.errors import UserError
 
+LONG_LIFESPAN_S = 60.0
+"""Lifespan in s above which, for urgent messages, the unit `ms` was probably left out."""
 _TIMES = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 _SIZES = {
     "": 1,

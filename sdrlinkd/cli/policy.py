@@ -9,9 +9,8 @@ import typer
 from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
 from sdrlinkd.cli.completion import one_of, robot_names, topic_names
 from sdrlinkd.cli.reserving import answer_of_team, asked_air, verdict_words
-from sdrlinkd.config import LONG_LIFESPAN_S
 from sdrlinkd.errors import UserError
-from sdrlinkd.units import octets, seconds
+from sdrlinkd.units import LONG_LIFESPAN_S, octets, seconds
 
 Topic = Annotated[str, typer.Argument(help="Topic name on the bus or in the registry.",
                                       autocompletion=topic_names)]  # fmt: skip

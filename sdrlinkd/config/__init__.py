@@ -19,13 +19,12 @@ from sdrlinkd.config.places import located
 from sdrlinkd.config.quantities import example as unit_example
 from sdrlinkd.config.radios import GnuRadioParams
 from sdrlinkd.config.schema import WITHOUT_AIR, BusParams, Config
-from sdrlinkd.config.setup import LONG_LIFESPAN_S, TF_TYPE, UNBOUNDED_TYPES, Setup, make_setup
+from sdrlinkd.config.setup import TF_TYPE, UNBOUNDED_TYPES, Setup, make_setup
 from sdrlinkd.config.topics import load_registry, policies_by_type
 
 __all__ = [
     "ENDPOINT",
     "FLEET_NAME",
-    "LONG_LIFESPAN_S",
     "SIMULATED_HZ",
     "TF_TYPE",
     "UNBOUNDED_TYPES",

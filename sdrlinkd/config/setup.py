@@ -31,6 +31,7 @@ from sdrlinkd.config.topics import (
 )
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import PolicyTable, Qos, TopicPolicy, check_access, flush_told
+from sdrlinkd.units import LONG_LIFESPAN_S
 from sdrlinkd.wire import (
     BROADCAST,
     Registry,
@@ -43,8 +44,6 @@ from sdrlinkd.wire import (
 )
 
 MIN_BEACON_S = 0.01
-LONG_LIFESPAN_S = 60.0
-"""Lifespan in s above which messages of an urgent class are hardly meant to live."""
 _NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _RX_NAME = re.compile(r"(/[A-Za-z_]\w*)+/?", re.ASCII)
 _PLACEHOLDER = re.compile(r"\{(src_id|src)\}")
